@@ -1,0 +1,3 @@
+//! Candelabra: light trees for scenes with very many lights.
+pub mod math;
+pub mod scene;

@@ -1,0 +1,83 @@
+//! Lights that are not meshes.
+
+use crate::math::color::Rgb;
+
+/// A light at a node. Where it aims, it aims along the node's local -Z.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Light {
+    /// The node it stands at; the node's path is the light's path.
+    pub node: u32,
+    /// What it is and how strong.
+    pub kind: LightKind,
+    /// Beyond this distance in metres it gives no light (glTF `range`); `None` is physical.
+    pub range_m: Option<f32>,
+    /// Take it out of the importance heuristic and sample it at every point.
+    pub forced: bool,
+}
+
+/// The kinds of light that are not meshes.
+#[derive(Clone, Debug, PartialEq)]
+pub enum LightKind {
+    /// A point: luminous intensity in candela, the same in every direction.
+    Point {
+        /// Candela.
+        intensity_cd: Rgb,
+    },
+    /// A point that aims.
+    Spot {
+        /// Candela on the axis.
+        intensity_cd: Rgb,
+        /// How intensity falls off the axis.
+        shaping: Shaping,
+    },
+    /// A sphere sampled as a sphere. Its radius is in the node's local space: the node's
+    /// transform must scale uniformly.
+    Sphere {
+        /// Luminance of the surface, nits.
+        radiance_nits: Rgb,
+        /// Radius in local units.
+        radius: f32,
+        /// Emission profile about -Z, if it has one.
+        shaping: Option<Shaping>,
+    },
+    /// A sun: parallel or nearly parallel light travelling along -Z.
+    Distant {
+        /// Illuminance on a surface that faces it, lux.
+        irradiance_lux: Rgb,
+        /// Full angular diameter, radians; 0 is a delta direction.
+        angle_rad: f32,
+    },
+    /// Light from all around: constant, or a latitude-longitude picture.
+    ///
+    /// The picture is laid out as UsdLux says: in local space +Y is its top row; direction
+    /// `(x, y, z)` is at `u = fract((atan2(z, x) + pi/2) / 2pi)`, `v = acos(y) / pi`.
+    Dome {
+        /// Luminance, or what the texture is multiplied by, nits.
+        radiance_nits: Rgb,
+        /// Index into [`Scene::textures`](super::Scene::textures).
+        texture: Option<u32>,
+    },
+}
+
+/// An emission profile: a factor on radiance or intensity by the angle off the axis (-Z).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Shaping {
+    /// `KHR_lights_punctual`: squared linear-in-cosine ramp between the two half angles.
+    Khr {
+        /// Half angle of full intensity, radians.
+        inner_rad: f32,
+        /// Half angle beyond which it is dark, radians, at most pi/2.
+        outer_rad: f32,
+    },
+    /// UsdLux ShapingAPI.
+    Usd {
+        /// Half angle of the cone, radians; beyond it is dark. pi or more is no cone.
+        cone_rad: f32,
+        /// `[0, 1]`: the smoothstep starts at `cone * (1 - softness)`.
+        softness: f32,
+        /// Exponent of `|cos|`; 0 is none.
+        focus: f32,
+        /// The colour that off-axis light is tinted towards where focus dims it; black by default.
+        focus_tint: [f32; 3],
+    },
+}

@@ -1,0 +1,90 @@
+//! Surfaces: glTF's metallic-roughness model.
+
+use super::TextureUse;
+use crate::math::color::Rgb;
+
+/// A metallic-roughness surface that may emit. Factors multiply their textures.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Material {
+    /// Its name in the file, for messages.
+    pub name: String,
+    /// Linear reflectance of the diffuse lobe, or of the metal at normal incidence.
+    pub base_color: Rgb,
+    /// sRGB texture of the above; its alpha multiplies `opacity`.
+    pub base_color_texture: Option<TextureUse>,
+    /// Coverage in `[0, 1]`.
+    pub opacity: f32,
+    /// What coverage means.
+    pub alpha_mode: AlphaMode,
+    /// 0 dielectric, 1 metal.
+    pub metallic: f32,
+    /// Perceptual roughness; GGX alpha is its square.
+    pub roughness: f32,
+    /// Linear texture: green is roughness, blue is metallic.
+    pub metallic_roughness_texture: Option<TextureUse>,
+    /// Index of refraction of the dielectric (`KHR_materials_ior`), 1.5 by default.
+    pub ior: f32,
+    /// Strength of the dielectric's specular lobe (`KHR_materials_specular`); 0 is Lambertian.
+    pub specular: f32,
+    /// Linear texture: alpha multiplies `specular`.
+    pub specular_texture: Option<TextureUse>,
+    /// Tint of the dielectric's reflection at normal incidence.
+    pub specular_color: Rgb,
+    /// sRGB texture of the tint.
+    pub specular_color_texture: Option<TextureUse>,
+    /// Tangent-space normals, linear.
+    pub normal_texture: Option<TextureUse>,
+    /// Scale of the normal map's x and y.
+    pub normal_scale: f32,
+    /// Emitted luminance, nits: emissive factor times strength.
+    pub emission_nits: Rgb,
+    /// sRGB (or float) texture that multiplies the emission.
+    pub emission_texture: Option<TextureUse>,
+    /// Emission leaves from both sides. Reflection always does.
+    pub double_sided: bool,
+}
+
+/// What coverage means.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum AlphaMode {
+    /// Coverage is ignored.
+    #[default]
+    Opaque,
+    /// A hit counts where coverage is at least this.
+    Mask(f32),
+    /// A hit counts with the probability of its coverage.
+    Blend,
+}
+
+impl Default for Material {
+    /// glTF's default material, but not metallic: what a mesh without a material looks like.
+    fn default() -> Self {
+        Material {
+            name: "(default)".into(),
+            base_color: Rgb::ONE,
+            base_color_texture: None,
+            opacity: 1.0,
+            alpha_mode: AlphaMode::Opaque,
+            metallic: 0.0,
+            roughness: 1.0,
+            metallic_roughness_texture: None,
+            ior: 1.5,
+            specular: 1.0,
+            specular_texture: None,
+            specular_color: Rgb::ONE,
+            specular_color_texture: None,
+            normal_texture: None,
+            normal_scale: 1.0,
+            emission_nits: Rgb::ZERO,
+            emission_texture: None,
+            double_sided: false,
+        }
+    }
+}
+
+impl Material {
+    /// Whether any light can leave this surface of its own.
+    pub fn emits(&self) -> bool {
+        self.emission_nits.max_element() > 0.0
+    }
+}

@@ -1,0 +1,41 @@
+//! Triangles, and where they stand.
+
+use super::Shaping;
+use glam::{Vec2, Vec3, Vec4};
+
+/// Triangles with one material, in local space. All attribute arrays that are not empty have as
+/// many entries as `positions`; every index is in range; every number is finite.
+#[derive(Clone, Debug, Default)]
+pub struct Mesh {
+    /// Its name in the file, for messages.
+    pub name: String,
+    /// Local-space positions, metres.
+    pub positions: Vec<Vec3>,
+    /// Unit normals, or empty: flat shading.
+    pub normals: Vec<Vec3>,
+    /// Unit tangents with the handedness in `w`, or empty: derived from the first texture set.
+    pub tangents: Vec<Vec4>,
+    /// Texture sets, by number; a set may be empty.
+    pub uv_sets: Vec<Vec<Vec2>>,
+    /// Linear vertex colours that multiply the base colour (alpha: the opacity), or empty.
+    pub colors: Vec<Vec4>,
+    /// Corners of each triangle, counter-clockwise seen from the front.
+    pub triangles: Vec<[u32; 3]>,
+    /// Index into [`Scene::materials`](super::Scene::materials).
+    pub material: Option<u32>,
+}
+
+/// A mesh put at a node: a prim that a ray can hit.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Instance {
+    /// The prim's path; unique in the scene.
+    pub path: String,
+    /// The node it stands at.
+    pub node: u32,
+    /// Index into [`Scene::meshes`](super::Scene::meshes).
+    pub mesh: u32,
+    /// Profile of the mesh's emission about the node's -Z, if it has one.
+    pub shaping: Option<Shaping>,
+    /// Take the mesh's light out of the importance heuristic and sample it at every point.
+    pub forced: bool,
+}

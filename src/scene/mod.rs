@@ -1,0 +1,86 @@
+//! Floor 1: the scene index, the scene in memory after ingest.
+//!
+//! A [`Scene`] is a simple normal form: flat tables that name each other by index. Whatever a file
+//! format can say is compiled down to it by `ingest`, so that nothing above ever asks where a prim
+//! came from. It holds data and answers questions about it ([`Scene::pose_at`],
+//! [`Scene::requirements`]); it reads no files and it is immutable while a frame renders.
+//!
+//! | table | what a row is |
+//! |---|---|
+//! | [`nodes`](Scene::nodes) | a place in the transform hierarchy, perhaps animated; parents first |
+//! | [`meshes`](Scene::meshes) | triangles with one material, in their own space |
+//! | [`materials`](Scene::materials), [`textures`](Scene::textures) | how a surface reflects and emits |
+//! | [`instances`](Scene::instances) | a mesh put at a node: what a ray can hit |
+//! | [`lights`](Scene::lights) | lights that are not meshes: points, spots, spheres, suns, domes |
+//! | [`cameras`](Scene::cameras) | a view from a node |
+//!
+//! Units: metres, seconds, radians; +Y is up. Emission is in the file's own photometric numbers
+//! (nits, candela, lux): radiance 1 in the file is 1 in the picture.
+//! Spaces: a mesh and a light are in their node's *local* space; [`Pose`] takes local to *world*.
+
+mod camera;
+mod light;
+mod material;
+mod mesh;
+mod pose;
+mod requirements;
+mod texture;
+mod timeline;
+
+pub use camera::Camera;
+pub use light::{Light, LightKind, Shaping};
+pub use material::{AlphaMode, Material};
+pub use mesh::{Instance, Mesh};
+pub use pose::{Channel, Interpolation, Keys, Node, Pose, Trs};
+pub use requirements::Requirements;
+pub use texture::{Pixels, Texture, TextureUse, Wrap};
+pub use timeline::Timeline;
+
+use std::path::PathBuf;
+
+/// Everything ingest found, by index. See the [module page](self).
+#[derive(Debug, Default)]
+pub struct Scene {
+    /// The file this scene was read from, for messages.
+    pub source: PathBuf,
+    /// The transform hierarchy. A parent stands before its children.
+    pub nodes: Vec<Node>,
+    /// Triangle meshes, one material each.
+    pub meshes: Vec<Mesh>,
+    /// Materials. A mesh without one uses [`Material::default`].
+    pub materials: Vec<Material>,
+    /// Decoded images with their sampling rule.
+    pub textures: Vec<Texture>,
+    /// Meshes put into the world.
+    pub instances: Vec<Instance>,
+    /// Lights that are not meshes.
+    pub lights: Vec<Light>,
+    /// Cameras, in the file's order.
+    pub cameras: Vec<Camera>,
+    /// How frame numbers map to seconds.
+    pub timeline: Timeline,
+    /// What the file holds and this scene does not, in words for the user; each names its object.
+    pub notes: Vec<String>,
+}
+
+impl Scene {
+    /// World transforms of all nodes at `time_s` seconds on the file's clock.
+    pub fn pose_at(&self, time_s: f64) -> Pose {
+        Pose::evaluate(&self.nodes, time_s)
+    }
+
+    /// The prim path of an instance, such as `/World/Lamps/lamp_12`.
+    pub fn instance_path(&self, instance: usize) -> &str {
+        &self.instances[instance].path
+    }
+
+    /// The prim path of a light.
+    pub fn light_path(&self, light: usize) -> &str {
+        &self.nodes[self.lights[light].node as usize].path
+    }
+
+    /// Which features of the renderer and the tree this scene switches on.
+    pub fn requirements(&self) -> Requirements {
+        Requirements::of(self)
+    }
+}

@@ -1,0 +1,201 @@
+//! The transform hierarchy and its evaluation at a time.
+
+use glam::{Affine3A, DAffine3, DQuat, DVec3, Quat, Vec3};
+
+/// A place in the transform hierarchy.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Node {
+    /// The prim path, `/World/Lamps/lamp_12`; unique in the scene.
+    pub path: String,
+    /// Index of the parent, smaller than this node's own.
+    pub parent: Option<u32>,
+    /// Local to parent, where no channel says otherwise.
+    pub local: Trs,
+    /// Animated parts of the local transform; later channels override earlier ones.
+    pub channels: Vec<Channel>,
+}
+
+/// A local transform: a matrix as the file gives it, or translation, rotation and scale.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Trs {
+    /// Any affine matrix. Cannot be animated.
+    Matrix(DAffine3),
+    /// Scale, then rotation, then translation.
+    Parts {
+        /// Metres.
+        translation: DVec3,
+        /// Unit quaternion.
+        rotation: DQuat,
+        /// Along the local axes.
+        scale: DVec3,
+    },
+}
+
+/// One animated part of a node's transform. `times_s` ascends and is not empty.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Channel {
+    /// Metres.
+    Translation(Keys<Vec3>),
+    /// Unit quaternions.
+    Rotation(Keys<Quat>),
+    /// Along the local axes.
+    Scale(Keys<Vec3>),
+}
+
+/// Key times and values of a channel.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Keys<T> {
+    /// Seconds on the file's clock, ascending, not empty.
+    pub times_s: Vec<f32>,
+    /// One value a key; with [`Interpolation::Cubic`] three: in-tangent, value, out-tangent.
+    pub values: Vec<T>,
+    /// What holds between keys.
+    pub interpolation: Interpolation,
+}
+
+/// What holds between two keys.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Interpolation {
+    /// Linear; spherical for rotations.
+    #[default]
+    Linear,
+    /// The earlier key's value.
+    Step,
+    /// glTF's cubic Hermite spline.
+    Cubic,
+}
+
+/// World transforms of all nodes at one time.
+#[derive(Clone, Debug)]
+pub struct Pose {
+    world: Vec<Affine3A>,
+}
+
+impl Default for Trs {
+    fn default() -> Self {
+        Trs::Parts { translation: DVec3::ZERO, rotation: DQuat::IDENTITY, scale: DVec3::ONE }
+    }
+}
+
+impl Pose {
+    /// Composes the hierarchy in double precision, so that only the result is rounded.
+    pub(super) fn evaluate(nodes: &[Node], time_s: f64) -> Pose {
+        let mut exact: Vec<DAffine3> = Vec::with_capacity(nodes.len());
+        for node in nodes {
+            let local = node.local_at(time_s);
+            exact.push(match node.parent {
+                Some(parent) => exact[parent as usize] * local,
+                None => local,
+            });
+        }
+        Pose { world: exact.iter().map(DAffine3::as_affine3a).collect() }
+    }
+
+    /// Local to world for a node.
+    #[inline]
+    pub fn world(&self, node: u32) -> Affine3A {
+        self.world[node as usize]
+    }
+}
+
+impl Node {
+    /// A node that stands still.
+    pub fn fixed(path: impl Into<String>, parent: Option<u32>, local: Trs) -> Node {
+        Node { path: path.into(), parent, local, channels: Vec::new() }
+    }
+
+    /// Local to parent at a time.
+    fn local_at(&self, time_s: f64) -> DAffine3 {
+        let (mut translation, mut rotation, mut scale) = match self.local {
+            Trs::Matrix(matrix) => return matrix,
+            Trs::Parts { translation, rotation, scale } => (translation, rotation, scale),
+        };
+        for channel in &self.channels {
+            match channel {
+                Channel::Translation(keys) => translation = keys.vector_at(time_s),
+                Channel::Scale(keys) => scale = keys.vector_at(time_s),
+                Channel::Rotation(keys) => rotation = keys.rotation_at(time_s),
+            }
+        }
+        DAffine3::from_scale_rotation_translation(scale, rotation, translation)
+    }
+}
+
+/// Where a time falls among keys: the two neighbours, the fraction between them, their distance.
+struct Between {
+    before: usize,
+    after: usize,
+    fraction: f64,
+    step_s: f64,
+}
+
+impl<T: Copy> Keys<T> {
+    fn find(&self, time_s: f64) -> Between {
+        let after = self.times_s.partition_point(|&key| f64::from(key) <= time_s);
+        let last = self.times_s.len() - 1;
+        if after == 0 || after > last {
+            let held = if after == 0 { 0 } else { last };
+            return Between { before: held, after: held, fraction: 0.0, step_s: 0.0 };
+        }
+        let (t0, t1) = (f64::from(self.times_s[after - 1]), f64::from(self.times_s[after]));
+        let fraction = (time_s - t0) / (t1 - t0);
+        Between { before: after - 1, after, fraction, step_s: t1 - t0 }
+    }
+
+    /// Hermite weights of (value, out-tangent, value, in-tangent), glTF 2.0 appendix C.
+    fn hermite(at: &Between) -> [f64; 4] {
+        let (t, step) = (at.fraction, at.step_s);
+        let (t2, t3) = (t * t, t * t * t);
+        [
+            2.0 * t3 - 3.0 * t2 + 1.0,
+            step * (t3 - 2.0 * t2 + t),
+            -2.0 * t3 + 3.0 * t2,
+            step * (t3 - t2),
+        ]
+    }
+
+    /// The four values that the Hermite weights multiply.
+    fn hermite_values(&self, at: &Between) -> [T; 4] {
+        let (a, b) = (3 * at.before, 3 * at.after);
+        [self.values[a + 1], self.values[a + 2], self.values[b + 1], self.values[b]]
+    }
+}
+
+impl Keys<Vec3> {
+    fn vector_at(&self, time_s: f64) -> DVec3 {
+        let at = self.find(time_s);
+        match self.interpolation {
+            Interpolation::Linear => {
+                let (a, b) = (self.values[at.before].as_dvec3(), self.values[at.after].as_dvec3());
+                a.lerp(b, at.fraction)
+            }
+            Interpolation::Step => self.values[at.before].as_dvec3(),
+            Interpolation::Cubic => {
+                let weights = Self::hermite(&at);
+                let values = self.hermite_values(&at);
+                (0..4).map(|i| values[i].as_dvec3() * weights[i]).sum()
+            }
+        }
+    }
+}
+
+impl Keys<Quat> {
+    fn rotation_at(&self, time_s: f64) -> DQuat {
+        let at = self.find(time_s);
+        match self.interpolation {
+            Interpolation::Linear => {
+                let (a, b) = (self.values[at.before].as_dquat(), self.values[at.after].as_dquat());
+                a.normalize().slerp(b.normalize(), at.fraction)
+            }
+            Interpolation::Step => self.values[at.before].as_dquat().normalize(),
+            Interpolation::Cubic => {
+                let weights = Self::hermite(&at);
+                let values = self.hermite_values(&at);
+                let sum = (0..4).fold(DQuat::from_xyzw(0.0, 0.0, 0.0, 0.0), |sum, i| {
+                    sum + values[i].as_dquat() * weights[i]
+                });
+                sum.normalize()
+            }
+        }
+    }
+}

@@ -1,0 +1,75 @@
+//! What a scene needs of the tree and the renderer.
+
+use super::{AlphaMode, LightKind, Scene};
+use serde::Serialize;
+
+/// The features that a scene switches on. What is false or zero here costs nothing anywhere.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct Requirements {
+    /// Instances of meshes whose material emits.
+    pub mesh_lights: usize,
+    /// Mesh lights whose emission is textured.
+    pub textured_mesh_lights: usize,
+    /// Mesh lights and other lights with an emission profile.
+    pub shaped_lights: usize,
+    /// Sphere lights sampled as spheres.
+    pub spheres: usize,
+    /// Point lights.
+    pub points: usize,
+    /// Spot lights.
+    pub spots: usize,
+    /// Suns.
+    pub suns: usize,
+    /// Domes.
+    pub domes: usize,
+    /// Meshes that more than one instance shares.
+    pub shared_meshes: usize,
+    /// Nodes that move.
+    pub animated_nodes: usize,
+    /// Materials with a coverage below one.
+    pub cutouts: usize,
+    /// Materials with a normal map.
+    pub normal_maps: usize,
+    /// Images.
+    pub textures: usize,
+    /// Cameras with a lens.
+    pub lenses: usize,
+}
+
+impl Requirements {
+    pub(super) fn of(scene: &Scene) -> Requirements {
+        let mut needs = Requirements { textures: scene.textures.len(), ..Default::default() };
+        let mut uses = vec![0u32; scene.meshes.len()];
+        for instance in &scene.instances {
+            uses[instance.mesh as usize] += 1;
+            let material = scene.meshes[instance.mesh as usize].material;
+            if let Some(material) = material.map(|m| &scene.materials[m as usize])
+                && material.emits()
+            {
+                needs.mesh_lights += 1;
+                needs.textured_mesh_lights += usize::from(material.emission_texture.is_some());
+                needs.shaped_lights += usize::from(instance.shaping.is_some());
+            }
+        }
+        needs.shared_meshes = uses.iter().filter(|&&count| count > 1).count();
+        for light in &scene.lights {
+            match light.kind {
+                LightKind::Point { .. } => needs.points += 1,
+                LightKind::Spot { .. } => needs.spots += 1,
+                LightKind::Sphere { shaping, .. } => {
+                    needs.spheres += 1;
+                    needs.shaped_lights += usize::from(shaping.is_some());
+                }
+                LightKind::Distant { .. } => needs.suns += 1,
+                LightKind::Dome { .. } => needs.domes += 1,
+            }
+        }
+        needs.animated_nodes = scene.nodes.iter().filter(|n| !n.channels.is_empty()).count();
+        for material in &scene.materials {
+            needs.cutouts += usize::from(material.alpha_mode != AlphaMode::Opaque);
+            needs.normal_maps += usize::from(material.normal_texture.is_some());
+        }
+        needs.lenses = scene.cameras.iter().filter(|c| c.lens_radius_m > 0.0).count();
+        needs
+    }
+}
