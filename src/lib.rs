@@ -1,3 +1,5 @@
 //! Candelabra: light trees for scenes with very many lights.
+pub mod bounds;
 pub mod math;
 pub mod scene;
+pub mod store;

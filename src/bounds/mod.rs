@@ -1,0 +1,48 @@
+//! Floor 1: what bounds an emitter or a cluster of emitters.
+//!
+//! A [`LightBounds`] is a box, a cone of orientations and an energy: everything the light tree knows
+//! of a light. `emitter` makes them, `light_tree` builds over them, and neither knows the other.
+//! Nothing here samples, and nothing here knows what kind of light it bounds.
+//!
+//! Source: Conty Estevez and Kulla, "Importance Sampling of Many Lights with Adaptive Tree
+//! Splitting", HPG 2018.
+
+mod aabb;
+mod cone;
+
+pub use aabb::Aabb;
+pub use cone::Cone;
+
+/// Box, cone and energy of one emitter or of a cluster.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LightBounds {
+    /// Contains every emitting point, metres.
+    pub aabb: Aabb,
+    /// Contains every emitting direction.
+    pub cone: Cone,
+    /// An estimate of what it contributes: the peak radiant intensity of its emitters, summed. One
+    /// scale for all kinds (`I` of a point, `L A` of a triangle). Positive.
+    pub energy: f32,
+}
+
+impl LightBounds {
+    /// The bounds of both together.
+    pub fn union(&self, other: &LightBounds) -> LightBounds {
+        LightBounds {
+            aabb: self.aabb.union(&other.aabb),
+            cone: self.cone.union(&other.cone),
+            energy: (f64::from(self.energy) + f64::from(other.energy)) as f32,
+        }
+    }
+
+    /// Whether every number is finite and the energy positive: what the tree may be built over.
+    pub fn is_sound(&self) -> bool {
+        let numbers = [self.aabb.min, self.aabb.max, self.cone.axis];
+        numbers.iter().all(|v| v.is_finite())
+            && self.aabb.min.cmple(self.aabb.max).all()
+            && self.cone.theta_o.is_finite()
+            && self.cone.theta_e.is_finite()
+            && self.energy.is_finite()
+            && self.energy > 0.0
+    }
+}

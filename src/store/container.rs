@@ -1,0 +1,341 @@
+//! The container: a header, a table of sections, and the sections. See the [room's page](super).
+
+use super::{ALIGNMENT, AlignedBytes, StoreError};
+use bytemuck::{Pod, Zeroable};
+use std::fmt;
+use std::ops::Range;
+
+/// The first eight bytes: one with the high bit set, a name, and the line ends that a transfer in
+/// text mode would change (PNG's manner).
+pub const MAGIC: [u8; 8] = *b"\x89LTR\r\n\x1a\n";
+/// Readers refuse another major version and read every minor one.
+pub const VERSION: (u16, u16) = (1, 0);
+const BYTE_ORDER_MARK: u32 = 0x0102_0304;
+/// No file has more sections; a header that says so is not believed.
+const MOST_SECTIONS: u32 = 256;
+
+/// Four ASCII letters that name a section.
+#[derive(Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
+#[repr(transparent)]
+pub struct SectionId(pub [u8; 4]);
+
+impl fmt::Display for SectionId {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}", self.0.escape_ascii())
+    }
+}
+
+impl fmt::Debug for SectionId {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        fmt::Display::fmt(self, f)
+    }
+}
+
+#[derive(Clone, Copy, Pod, Zeroable)]
+#[repr(C)]
+struct Header {
+    magic: [u8; 8],
+    major: u16,
+    minor: u16,
+    byte_order: u32,
+    file_length: u64,
+    section_count: u32,
+    /// CRC-32 of header and table, with this field zero.
+    checksum: u32,
+    fingerprint: [u8; 32],
+}
+
+/// One row of the section table.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
+pub struct Section {
+    /// Its name.
+    pub id: SectionId,
+    /// 1 if a reader that does not know it must refuse the file.
+    pub required: u32,
+    /// First byte in the file; a multiple of [`ALIGNMENT`].
+    pub offset: u64,
+    /// Length in bytes.
+    pub length: u64,
+    /// Bytes of one element.
+    pub element_size: u32,
+    /// CRC-32 of its bytes.
+    pub checksum: u32,
+}
+
+const HEADER_SIZE: usize = size_of::<Header>();
+const ROW_SIZE: usize = size_of::<Section>();
+
+/// Gathers sections and lays them out.
+#[derive(Default)]
+pub struct ContainerWriter<'a> {
+    sections: Vec<(Section, &'a [u8])>,
+}
+
+impl<'a> ContainerWriter<'a> {
+    /// Adds a section. Sections keep the order in which they are added.
+    pub fn section<T: Pod>(&mut self, id: SectionId, required: bool, elements: &'a [T]) {
+        let bytes: &[u8] = bytemuck::cast_slice(elements);
+        let row = Section {
+            id,
+            required: required.into(),
+            offset: 0,
+            length: bytes.len() as u64,
+            element_size: size_of::<T>() as u32,
+            checksum: crc32fast::hash(bytes),
+        };
+        self.sections.push((row, bytes));
+    }
+
+    /// The whole file, with the content's fingerprint in its header.
+    pub fn finish(mut self, fingerprint: [u8; 32]) -> AlignedBytes {
+        let mut end = HEADER_SIZE + self.sections.len() * ROW_SIZE;
+        for (row, _) in &mut self.sections {
+            end = end.next_multiple_of(ALIGNMENT);
+            row.offset = end as u64;
+            end += row.length as usize;
+        }
+        let header = Header {
+            magic: MAGIC,
+            major: VERSION.0,
+            minor: VERSION.1,
+            byte_order: BYTE_ORDER_MARK,
+            file_length: end as u64,
+            section_count: self.sections.len() as u32,
+            checksum: 0,
+            fingerprint,
+        };
+        let mut file = AlignedBytes::zeroed(end);
+        let bytes = file.as_mut();
+        bytes[..HEADER_SIZE].copy_from_slice(bytemuck::bytes_of(&header));
+        for (i, (row, content)) in self.sections.iter().enumerate() {
+            let at = HEADER_SIZE + i * ROW_SIZE;
+            bytes[at..at + ROW_SIZE].copy_from_slice(bytemuck::bytes_of(row));
+            bytes[row.offset as usize..][..content.len()].copy_from_slice(content);
+        }
+        let table_end = HEADER_SIZE + self.sections.len() * ROW_SIZE;
+        let checksum = crc32fast::hash(&bytes[..table_end]);
+        bytes[CHECKSUM_FIELD].copy_from_slice(&checksum.to_le_bytes());
+        file
+    }
+}
+
+const CHECKSUM_FIELD: Range<usize> = 28..32;
+
+/// A container over some bytes: mapped, or just written.
+pub struct Container<D> {
+    data: D,
+    sections: Vec<Section>,
+    fingerprint: [u8; 32],
+}
+
+impl<D: AsRef<[u8]>> Container<D> {
+    /// Reads header and table; touches no section. Sections that are not in `known` are skipped,
+    /// or refused if they are required.
+    ///
+    /// # Errors
+    /// Whatever [`StoreError`] says about headers and tables.
+    pub fn open(data: D, known: &[SectionId]) -> Result<Container<D>, StoreError> {
+        let bytes = data.as_ref();
+        let header = read_header(bytes)?;
+        let table_end = HEADER_SIZE + header.section_count as usize * ROW_SIZE;
+        let actual = bytes.len() as u64;
+        if header.section_count > MOST_SECTIONS
+            || header.file_length != actual
+            || table_end > bytes.len()
+        {
+            return Err(StoreError::Length { promised: header.file_length, actual });
+        }
+        let mut hasher = crc32fast::Hasher::new();
+        hasher.update(&bytes[..CHECKSUM_FIELD.start]);
+        hasher.update(&[0; 4]);
+        hasher.update(&bytes[CHECKSUM_FIELD.end..table_end]);
+        if hasher.finalize() != header.checksum {
+            return Err(StoreError::Checksum { part: "the header".into() });
+        }
+        let sections: Vec<Section> = bytes[HEADER_SIZE..table_end]
+            .chunks_exact(ROW_SIZE)
+            .map(bytemuck::pod_read_unaligned)
+            .collect();
+        check_layout(&sections, table_end as u64, actual)?;
+        if let Some(alien) = sections.iter().find(|s| s.required != 0 && !known.contains(&s.id)) {
+            return Err(StoreError::Unknown(alien.id));
+        }
+        Ok(Container { fingerprint: header.fingerprint, sections, data })
+    }
+
+    /// Compares every section with its checksum, and the gaps between them with zero.
+    ///
+    /// # Errors
+    /// The first section that is damaged.
+    pub fn verify_checksums(&self) -> Result<(), StoreError> {
+        let bytes = self.data.as_ref();
+        let mut end = HEADER_SIZE + self.sections.len() * ROW_SIZE;
+        for section in &self.sections {
+            let range = section.offset as usize..(section.offset + section.length) as usize;
+            let gap_is_zero = bytes[end..range.start].iter().all(|&byte| byte == 0);
+            if !gap_is_zero || crc32fast::hash(&bytes[range.clone()]) != section.checksum {
+                return Err(StoreError::Checksum { part: format!("section {}", section.id) });
+            }
+            end = range.end;
+        }
+        Ok(())
+    }
+
+    /// The content's fingerprint, from the header.
+    pub fn fingerprint(&self) -> [u8; 32] {
+        self.fingerprint
+    }
+
+    /// The section table.
+    pub fn sections(&self) -> &[Section] {
+        &self.sections
+    }
+
+    /// Where a section's elements are, if it is there; checked to be whole elements of `T`.
+    ///
+    /// # Errors
+    /// [`StoreError::Section`] if the element size is another.
+    pub fn find<T: Pod>(&self, id: SectionId) -> Result<Option<Range<usize>>, StoreError> {
+        let Some(section) = self.sections.iter().find(|s| s.id == id) else {
+            return Ok(None);
+        };
+        let size = size_of::<T>();
+        if section.element_size as usize != size || section.length as usize % size != 0 {
+            let rule = format!("elements must be {size} bytes each");
+            return Err(StoreError::Section { section: id, rule });
+        }
+        Ok(Some(section.offset as usize..(section.offset + section.length) as usize))
+    }
+
+    /// The elements of a range that [`find`](Container::find) gave; empty if the bytes are not
+    /// aligned for `T`, which neither a mapped file nor [`AlignedBytes`] is.
+    #[inline]
+    pub fn view<T: Pod>(&self, range: &Range<usize>) -> &[T] {
+        bytemuck::try_cast_slice(&self.data.as_ref()[range.clone()]).unwrap_or(&[])
+    }
+
+    /// All bytes.
+    pub fn bytes(&self) -> &[u8] {
+        self.data.as_ref()
+    }
+}
+
+fn read_header(bytes: &[u8]) -> Result<Header, StoreError> {
+    let start = &bytes[..bytes.len().min(MAGIC.len())];
+    if start != MAGIC {
+        // What `\r\n` -> `\n`, `\n` -> `\r\n` and a cleared high bit leave of the magic.
+        let text_mode: [&[u8]; 3] = [b"\x89LTR\n\x1a\n", b"\x89LTR\r\r\n\x1a", b"\x09LTR\r\n\x1a\n"];
+        let damaged = text_mode.iter().any(|form| bytes.starts_with(form));
+        return Err(if damaged { StoreError::TextMode } else { StoreError::NotOurs });
+    }
+    if bytes.len() < HEADER_SIZE {
+        return Err(StoreError::Length { promised: HEADER_SIZE as u64, actual: bytes.len() as u64 });
+    }
+    let header: Header = bytemuck::pod_read_unaligned(&bytes[..HEADER_SIZE]);
+    if header.byte_order != BYTE_ORDER_MARK {
+        return Err(StoreError::ByteOrder);
+    }
+    if header.major != VERSION.0 {
+        return Err(StoreError::Version { found: header.major, known: VERSION.0 });
+    }
+    Ok(header)
+}
+
+/// Sections lie in order, aligned, without overlap, inside the file.
+fn check_layout(sections: &[Section], table_end: u64, file_length: u64) -> Result<(), StoreError> {
+    let mut end = table_end;
+    for (i, section) in sections.iter().enumerate() {
+        let fail = |rule: &str| {
+            Err(StoreError::Section { section: section.id, rule: rule.into() })
+        };
+        let Some(section_end) = section.offset.checked_add(section.length) else {
+            return fail("it ends beyond every file");
+        };
+        if section.offset % ALIGNMENT as u64 != 0 {
+            return fail("its offset is not a multiple of 64");
+        }
+        if section.offset < end || section.offset - end >= ALIGNMENT as u64 {
+            return fail("it does not follow the one before it");
+        }
+        if section_end > file_length {
+            return fail("it ends beyond the file");
+        }
+        if section.element_size == 0 {
+            return fail("its elements have no size");
+        }
+        if sections[..i].iter().any(|earlier| earlier.id == section.id) {
+            return fail("it appears twice");
+        }
+        end = section_end;
+    }
+    if end != file_length {
+        return Err(StoreError::Length { promised: end, actual: file_length });
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const NUMBERS: SectionId = SectionId(*b"NUMB");
+    const NOTES: SectionId = SectionId(*b"NOTE");
+
+    fn sample() -> AlignedBytes {
+        let mut writer = ContainerWriter::default();
+        writer.section(NUMBERS, true, &[1_u32, 2, 3]);
+        writer.section(NOTES, false, b"hello");
+        writer.finish([7; 32])
+    }
+
+    /// Opens and checks everything.
+    fn read(bytes: &[u8]) -> Result<Vec<u32>, StoreError> {
+        let container = Container::open(AlignedBytes::copy_of(bytes), &[NUMBERS])?;
+        container.verify_checksums()?;
+        let range = container.find::<u32>(NUMBERS)?.ok_or(StoreError::Missing(NUMBERS))?;
+        Ok(container.view(&range).to_vec())
+    }
+
+    #[test]
+    fn what_was_written_is_read() {
+        assert_eq!(read(sample().as_ref()).unwrap(), [1, 2, 3]);
+    }
+
+    #[test]
+    fn every_prefix_and_every_flipped_bit_is_refused() {
+        let whole = sample();
+        let whole = whole.as_ref();
+        for length in 0..whole.len() {
+            assert!(read(&whole[..length]).is_err(), "prefix of {length}");
+        }
+        for bit in 0..whole.len() * 8 {
+            let mut flipped = whole.to_vec();
+            flipped[bit / 8] ^= 1 << (bit % 8);
+            // The fingerprint and the minor version are under the header's checksum too.
+            assert!(read(&flipped).is_err(), "bit {bit}");
+        }
+    }
+
+    #[test]
+    fn damage_is_named() {
+        let whole = sample().as_ref().to_vec();
+        assert_eq!(read(b"PK\x03\x04 something else"), Err(StoreError::NotOurs));
+        let text: Vec<u8> = whole.iter().copied().filter(|&byte| byte != b'\r').collect();
+        assert_eq!(read(&text), Err(StoreError::TextMode));
+        let mut later = whole.clone();
+        later[8] = 2;
+        assert_eq!(read(&later), Err(StoreError::Version { found: 2, known: 1 }));
+        let longer = [whole.as_slice(), b"x"].concat();
+        assert!(matches!(read(&longer), Err(StoreError::Length { .. })));
+    }
+
+    #[test]
+    fn unknown_sections_are_skipped_unless_required() {
+        let mut writer = ContainerWriter::default();
+        writer.section(NOTES, true, b"must understand");
+        let bytes = writer.finish([0; 32]);
+        let opened = Container::open(bytes, &[NUMBERS]);
+        assert_eq!(opened.err(), Some(StoreError::Unknown(NOTES)));
+    }
+}

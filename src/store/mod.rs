@@ -1,0 +1,16 @@
+//! Floor 1: bytes on disk, and nothing of what they mean.
+//!
+//! A [`Container`] is a header, a table of sections and the sections themselves, over mapped or owned
+//! bytes. [`map`] maps a file. What the sections of a tree file hold is `light_tree`'s affair.
+#![doc = include_str!("format.md")]
+
+mod bytes;
+mod container;
+mod error;
+mod map;
+
+pub use bytes::{ALIGNMENT, AlignedBytes};
+pub use container::{Container, ContainerWriter, MAGIC, Section, SectionId, VERSION};
+pub use error::StoreError;
+pub use map::map;
+pub use memmap2::Mmap;
