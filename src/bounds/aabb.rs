@@ -17,10 +17,9 @@ impl Aabb {
 
     /// The smallest box around some points.
     pub fn around(points: impl IntoIterator<Item = Vec3>) -> Aabb {
-        points.into_iter().fold(Aabb::EMPTY, |aabb, p| Aabb {
-            min: aabb.min.min(p),
-            max: aabb.max.max(p),
-        })
+        points
+            .into_iter()
+            .fold(Aabb::EMPTY, |aabb, p| Aabb { min: aabb.min.min(p), max: aabb.max.max(p) })
     }
 
     /// The smallest box around both.

@@ -22,8 +22,7 @@ pub struct Cone {
 
 impl Cone {
     /// All directions: points and spheres.
-    pub const ALL: Cone =
-        Cone { axis: Vec3::Z, theta_o: PI, theta_e: FRAC_PI_2, two_sided: false };
+    pub const ALL: Cone = Cone { axis: Vec3::Z, theta_o: PI, theta_e: FRAC_PI_2, two_sided: false };
 
     /// One flat face that emits along its normal, and from its back too if `two_sided`.
     pub fn flat(normal: Vec3, two_sided: bool) -> Cone {
@@ -90,8 +89,9 @@ mod tests {
             Vec3::new(r * phi.cos(), r * phi.sin(), z)
         });
         let theta_o = prop_oneof![Just(0.0), 0.0f32..PI, Just(PI)];
-        (unit, theta_o, 0.01f32..FRAC_PI_2, any::<bool>())
-            .prop_map(|(axis, theta_o, theta_e, two_sided)| Cone { axis, theta_o, theta_e, two_sided })
+        (unit, theta_o, 0.01f32..FRAC_PI_2, any::<bool>()).prop_map(
+            |(axis, theta_o, theta_e, two_sided)| Cone { axis, theta_o, theta_e, two_sided },
+        )
     }
 
     /// Whether `outer` contains the normals of `inner`, up to rounding.

@@ -225,12 +225,16 @@ fn read_header(bytes: &[u8]) -> Result<Header, StoreError> {
     let start = &bytes[..bytes.len().min(MAGIC.len())];
     if start != MAGIC {
         // What `\r\n` -> `\n`, `\n` -> `\r\n` and a cleared high bit leave of the magic.
-        let text_mode: [&[u8]; 3] = [b"\x89LTR\n\x1a\n", b"\x89LTR\r\r\n\x1a", b"\x09LTR\r\n\x1a\n"];
+        let text_mode: [&[u8]; 3] =
+            [b"\x89LTR\n\x1a\n", b"\x89LTR\r\r\n\x1a", b"\x09LTR\r\n\x1a\n"];
         let damaged = text_mode.iter().any(|form| bytes.starts_with(form));
         return Err(if damaged { StoreError::TextMode } else { StoreError::NotOurs });
     }
     if bytes.len() < HEADER_SIZE {
-        return Err(StoreError::Length { promised: HEADER_SIZE as u64, actual: bytes.len() as u64 });
+        return Err(StoreError::Length {
+            promised: HEADER_SIZE as u64,
+            actual: bytes.len() as u64,
+        });
     }
     let header: Header = bytemuck::pod_read_unaligned(&bytes[..HEADER_SIZE]);
     if header.byte_order != BYTE_ORDER_MARK {
@@ -246,9 +250,7 @@ fn read_header(bytes: &[u8]) -> Result<Header, StoreError> {
 fn check_layout(sections: &[Section], table_end: u64, file_length: u64) -> Result<(), StoreError> {
     let mut end = table_end;
     for (i, section) in sections.iter().enumerate() {
-        let fail = |rule: &str| {
-            Err(StoreError::Section { section: section.id, rule: rule.into() })
-        };
+        let fail = |rule: &str| Err(StoreError::Section { section: section.id, rule: rule.into() });
         let Some(section_end) = section.offset.checked_add(section.length) else {
             return fail("it ends beyond every file");
         };

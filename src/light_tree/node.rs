@@ -1,0 +1,281 @@
+//! A node of the tree: light bounds in 32 bytes, rounded outwards.
+//!
+//! Position is kept in full (`f32`), size and direction in few bits, so that a micrometre light and
+//! a kilometre light fit one scene. Everything that decides "no light from here" is rounded to the
+//! safe side: boxes and cones only ever grow. The layout is in the [format](crate::store).
+
+use crate::bounds::{Aabb, Cone, LightBounds};
+use crate::math::angle::between;
+use bytemuck::{Pod, Zeroable};
+use glam::{DVec3, Vec2, Vec3};
+
+/// One emitter or one cluster. Siblings lie side by side: a step down touches one cache line.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
+pub struct Node {
+    center: [f32; 3],
+    energy: f32,
+    half_extent: [u8; 3],
+    half_exponent: u8,
+    axis: [i16; 2],
+    theta_o: u16,
+    theta_e: u8,
+    reserved: u8,
+    link: u32,
+}
+
+/// Two siblings in one cache line.
+pub type Pair = [Node; 2];
+
+/// Where a node leads.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Link {
+    /// The pair that holds its children.
+    Inner(u32),
+    /// The number of its leaf.
+    Leaf(u32),
+}
+
+const LEAF_BIT: u32 = 1 << 31;
+const TWO_SIDED_BIT: u16 = 1 << 15;
+const AXIS_STEPS: f32 = 32767.0;
+/// `1 - cos theta_o` in `[0, 2]` takes fifteen bits.
+const THETA_O_STEPS: f64 = 32767.0 / 2.0;
+/// `sqrt(1 - cos theta_e)` in `[0, 1]` takes eight: nearly even steps in angle.
+const THETA_E_STEPS: f64 = 255.0;
+/// Forgiven when an angle is rounded up, relative: what `f32` loses between decoding and encoding
+/// again, which must not widen a cone. Far below the slack that importance grants.
+const ANGLE_FORGIVEN: f64 = 1.0 - 4e-7;
+
+impl Node {
+    /// Rounds bounds outwards into a node.
+    pub fn encode(bounds: &LightBounds, link: Link) -> Node {
+        let center = bounds.aabb.center();
+        let (half_extent, half_exponent) = encode_half_extent(&bounds.aabb, center);
+        let axis = encode_axis(bounds.cone.axis);
+        let tilt = between(decode_axis(axis).normalize(), bounds.cone.axis);
+        // `between` of equal vectors is exactly 0, so an axis that survives costs no widening.
+        let theta_o = (one_minus_cos(bounds.cone.theta_o + tilt) * THETA_O_STEPS).ceil();
+        let theta_e = (one_minus_cos(bounds.cone.theta_e).sqrt() * THETA_E_STEPS).ceil();
+        let two_sided = if bounds.cone.two_sided { TWO_SIDED_BIT } else { 0 };
+        Node {
+            center: center.to_array(),
+            energy: bounds.energy,
+            half_extent,
+            half_exponent,
+            axis,
+            theta_o: theta_o.min(32767.0) as u16 | two_sided,
+            theta_e: theta_e.min(255.0) as u8,
+            reserved: 0,
+            link: match link {
+                Link::Inner(pair) => pair,
+                Link::Leaf(leaf) => leaf | LEAF_BIT,
+            },
+        }
+    }
+
+    /// The bounds as sampling sees them: those that were encoded, and a little more.
+    pub fn bounds(&self) -> LightBounds {
+        let (center, half) = (self.center().as_dvec3(), self.half_extent().as_dvec3());
+        let angle = |one_minus_cos: f64| 2.0 * (0.5 * one_minus_cos).sqrt().min(1.0).asin();
+        let theta_o = f64::from(self.theta_o & !TWO_SIDED_BIT) / THETA_O_STEPS;
+        let theta_e = (f64::from(self.theta_e) / THETA_E_STEPS).powi(2);
+        LightBounds {
+            aabb: Aabb { min: round_down(center - half), max: -round_down(-center - half) },
+            cone: Cone {
+                axis: decode_axis(self.axis).normalize(),
+                theta_o: angle(theta_o) as f32,
+                theta_e: angle(theta_e) as f32,
+                two_sided: self.is_two_sided(),
+            },
+            energy: self.energy,
+        }
+    }
+
+    /// Where it leads.
+    #[inline]
+    pub fn link(&self) -> Link {
+        if self.link & LEAF_BIT == 0 {
+            Link::Inner(self.link)
+        } else {
+            Link::Leaf(self.link & !LEAF_BIT)
+        }
+    }
+
+    /// Middle of the box, world space, metres.
+    #[inline]
+    pub fn center(&self) -> Vec3 {
+        Vec3::from_array(self.center)
+    }
+
+    /// Half the edges of the box, metres.
+    #[inline]
+    pub fn half_extent(&self) -> Vec3 {
+        let scale = f32::from_bits(u32::from(self.half_exponent) << 23);
+        Vec3::from_array(self.half_extent.map(f32::from)) * scale
+    }
+
+    /// Peak radiant intensity, summed over the cluster.
+    #[inline]
+    pub fn energy(&self) -> f32 {
+        self.energy
+    }
+
+    /// Cone axis, not of unit length.
+    #[inline]
+    pub(super) fn axis_unnormalised(&self) -> Vec3 {
+        decode_axis(self.axis)
+    }
+
+    #[inline]
+    pub(super) fn cos_theta_o(&self) -> f32 {
+        1.0 - f32::from(self.theta_o & !TWO_SIDED_BIT) * (1.0 / THETA_O_STEPS as f32)
+    }
+
+    #[inline]
+    pub(super) fn cos_theta_e(&self) -> f32 {
+        let root = f32::from(self.theta_e) * (1.0 / THETA_E_STEPS as f32);
+        1.0 - root * root
+    }
+
+    #[inline]
+    pub(super) fn is_two_sided(&self) -> bool {
+        self.theta_o & TWO_SIDED_BIT != 0
+    }
+
+    /// What a node must be whatever its neighbours: the first rule it breaks.
+    pub(super) fn broken_rule(&self) -> Option<&'static str> {
+        if !self.center().is_finite() || !self.half_extent().is_finite() {
+            Some("its box is not finite")
+        } else if !(self.energy.is_finite() && self.energy > 0.0) {
+            Some("its energy is not a positive number")
+        } else if self.axis.contains(&i16::MIN) {
+            Some("its axis is out of range")
+        } else if self.reserved != 0 {
+            Some("its reserved byte is not zero")
+        } else {
+            None
+        }
+    }
+}
+
+/// `1 - cos` of an angle in `[0, pi]`, a hair smaller than exact: see [`ANGLE_FORGIVEN`].
+fn one_minus_cos(angle_rad: f32) -> f64 {
+    let angle = f64::from(angle_rad).min(std::f64::consts::PI) * ANGLE_FORGIVEN;
+    2.0 * (0.5 * angle).sin().powi(2)
+}
+
+/// The smallest shared exponent and the mantissas, rounded up, that reach both faces of the box
+/// from its rounded centre.
+fn encode_half_extent(aabb: &Aabb, center: Vec3) -> ([u8; 3], u8) {
+    let center = center.as_dvec3();
+    let reach = (aabb.max.as_dvec3() - center).max(center - aabb.min.as_dvec3());
+    let longest = reach.max_element();
+    if longest <= 0.0 {
+        return ([0; 3], 0);
+    }
+    let mut exponent = ((longest / 255.0).log2().ceil() as i32 + 127).clamp(1, 254);
+    // `log2` may round across a power of two.
+    while exponent < 254 && longest / 2f64.powi(exponent - 127) > 255.0 {
+        exponent += 1;
+    }
+    let mantissa = (reach / 2f64.powi(exponent - 127)).ceil().min(DVec3::splat(255.0));
+    (mantissa.to_array().map(|m| m as u8), exponent as u8)
+}
+
+/// Octahedral encoding (Cigolle et al. 2014), rounded to the nearest.
+fn encode_axis(axis: Vec3) -> [i16; 2] {
+    let flat = axis / (axis.x.abs() + axis.y.abs() + axis.z.abs());
+    let mut folded = flat.truncate();
+    if flat.z < 0.0 {
+        folded = (Vec2::ONE - Vec2::new(flat.y, flat.x).abs()) * sign(flat.truncate());
+    }
+    (folded * AXIS_STEPS).round().to_array().map(|step| step as i16)
+}
+
+/// The direction of an octahedral code, not of unit length.
+#[inline]
+fn decode_axis(code: [i16; 2]) -> Vec3 {
+    let flat = Vec2::from_array(code.map(f32::from)) * (1.0 / AXIS_STEPS);
+    let z = 1.0 - flat.x.abs() - flat.y.abs();
+    let fold = (-z).max(0.0);
+    (flat - fold * sign(flat)).extend(z)
+}
+
+/// +1 or -1, also of zero.
+#[inline]
+fn sign(v: Vec2) -> Vec2 {
+    Vec2::new(1f32.copysign(v.x), 1f32.copysign(v.y))
+}
+
+/// The largest `f32`s that are not above.
+fn round_down(exact: DVec3) -> Vec3 {
+    Vec3::from_array(exact.to_array().map(|exact| {
+        let rounded = exact as f32;
+        if f64::from(rounded) > exact { rounded.next_down() } else { rounded }
+    }))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+    use std::f32::consts::{FRAC_PI_2, PI};
+
+    fn any_bounds() -> impl Strategy<Value = LightBounds> {
+        let point = prop::array::uniform3(-1f32..1.0).prop_map(Vec3::from);
+        let scale = (-20i32..20).prop_map(|e| 2f32.powi(e));
+        let extent = prop::array::uniform3(prop_oneof![Just(0f32), 0f32..1.0]).prop_map(Vec3::from);
+        let axis = point.clone().prop_filter_map("no direction", Vec3::try_normalize);
+        let theta_o = prop_oneof![Just(0f32), 0f32..PI];
+        let theta_e = prop_oneof![Just(FRAC_PI_2), 0.001f32..FRAC_PI_2];
+        let cone = (axis, theta_o, theta_e, any::<bool>()).prop_map(
+            |(axis, theta_o, theta_e, two_sided)| Cone { axis, theta_o, theta_e, two_sided },
+        );
+        (point, scale.clone(), extent, scale, cone, 1e-30f32..1e30).prop_map(
+            |(p, far, extent, size, cone, energy)| {
+                let min = p * far;
+                LightBounds { aabb: Aabb { min, max: min + extent * size }, cone, energy }
+            },
+        )
+    }
+
+    proptest! {
+        #[test]
+        fn a_node_contains_what_it_encodes(bounds in any_bounds()) {
+            let decoded = Node::encode(&bounds, Link::Leaf(3)).bounds();
+            prop_assert!(decoded.aabb.contains_box(&bounds.aabb), "{decoded:?}");
+            let tilt = between(decoded.cone.axis, bounds.cone.axis);
+            let needed = (tilt + bounds.cone.theta_o).min(PI);
+            prop_assert!(decoded.cone.theta_o >= needed - 2e-6);
+            prop_assert!(decoded.cone.theta_e >= bounds.cone.theta_e - 1e-6);
+            prop_assert_eq!(decoded.energy, bounds.energy);
+        }
+
+        #[test]
+        fn encoding_twice_is_encoding_once(bounds in any_bounds()) {
+            let once = Node::encode(&bounds, Link::Inner(5));
+            let twice = Node::encode(&once.bounds(), Link::Inner(5));
+            prop_assert_eq!(once.axis, twice.axis);
+            prop_assert_eq!(once.theta_o, twice.theta_o);
+            prop_assert_eq!(once.theta_e, twice.theta_e);
+        }
+    }
+
+    #[test]
+    fn what_is_exact_stays_exact() {
+        let bounds = LightBounds {
+            aabb: Aabb { min: Vec3::splat(1e7), max: Vec3::splat(1e7) },
+            cone: Cone::flat(Vec3::Y, true),
+            energy: 2.0,
+        };
+        assert_eq!(Node::encode(&bounds, Link::Leaf(0)).bounds(), bounds);
+        let all = LightBounds { cone: Cone::ALL, ..bounds };
+        assert_eq!(Node::encode(&all, Link::Leaf(0)).bounds().cone, Cone::ALL);
+    }
+
+    #[test]
+    fn a_node_is_half_a_cache_line() {
+        assert_eq!((size_of::<Node>(), size_of::<Pair>()), (32, 64));
+    }
+}

@@ -1,0 +1,157 @@
+//! A light tree file, opened: the same type over bytes just built and bytes just mapped.
+
+use super::node::Pair;
+use super::records::{self, FrameRow, LeafContent, LightRow, NO_TREE, TreeRow};
+use crate::store::{Container, Section, SectionId, StoreError};
+use std::ops::Range;
+
+/// The light trees of a shot, viewed in the bytes of their file.
+///
+/// [`open`](LightTree::open) looks at the header alone; [`verify`](LightTree::verify) proves the
+/// rest. Sampling an unverified tree may give wrong numbers, but it ends, stays inside the bytes and
+/// does not panic.
+pub struct LightTree<D> {
+    container: Container<D>,
+    trees: Range<usize>,
+    pairs: Range<usize>,
+    leaves: Range<usize>,
+    frames: Option<Range<usize>>,
+    lights: Range<usize>,
+    paths: Range<usize>,
+}
+
+impl<D: AsRef<[u8]>> LightTree<D> {
+    /// Opens the bytes of a tree file in constant time.
+    ///
+    /// # Errors
+    /// If the header or the section table is not sound; see [`StoreError`].
+    pub fn open(data: D) -> Result<Self, StoreError> {
+        let container = Container::open(data, &records::ALL)?;
+        let missing = |id: SectionId| move || StoreError::Missing(id);
+        Ok(LightTree {
+            trees: container
+                .find::<TreeRow>(records::TREES)?
+                .ok_or_else(missing(records::TREES))?,
+            pairs: container.find::<Pair>(records::NODES)?.ok_or_else(missing(records::NODES))?,
+            leaves: container.find::<u32>(records::LEAVES)?.ok_or_else(missing(records::LEAVES))?,
+            frames: container.find::<FrameRow>(records::FRAMES)?,
+            lights: container
+                .find::<LightRow>(records::LIGHTS)?
+                .ok_or_else(missing(records::LIGHTS))?,
+            paths: container.find::<u8>(records::PATHS)?.ok_or_else(missing(records::PATHS))?,
+            container,
+        })
+    }
+
+    /// The fingerprint of the content the trees were built from.
+    pub fn fingerprint(&self) -> [u8; 32] {
+        self.container.fingerprint()
+    }
+
+    /// The trees.
+    pub fn trees(&self) -> &[TreeRow] {
+        self.container.view(&self.trees)
+    }
+
+    /// Sibling nodes of all trees.
+    pub fn pairs(&self) -> &[Pair] {
+        self.container.view(&self.pairs)
+    }
+
+    /// What each leaf stands for, encoded; see [`LeafContent`].
+    pub fn leaves(&self) -> &[u32] {
+        self.container.view(&self.leaves)
+    }
+
+    /// The frames that have a tree of their own; empty if nothing moves.
+    pub fn frames(&self) -> &[FrameRow] {
+        self.frames.as_ref().map_or(&[], |range| self.container.view(range))
+    }
+
+    /// The lights.
+    pub fn lights(&self) -> &[LightRow] {
+        self.container.view(&self.lights)
+    }
+
+    /// The prim path of a light; empty if its row lies.
+    pub fn light_path(&self, light: &LightRow) -> &str {
+        let paths: &[u8] = self.container.view(&self.paths);
+        let (start, length) = (light.path_offset as usize, light.path_length as usize);
+        let bytes = paths.get(start..).and_then(|rest| rest.get(..length)).unwrap_or_default();
+        std::str::from_utf8(bytes).unwrap_or_default()
+    }
+
+    /// How many emitters the lights have.
+    pub fn emitter_count(&self) -> usize {
+        self.lights().last().map_or(0, |l| l.first_emitter as usize + l.emitter_count as usize)
+    }
+
+    /// Number of emitters that stand still: they come first.
+    pub fn static_emitter_count(&self) -> usize {
+        let moving = self.lights().iter().find(|light| light.moves != 0);
+        moving.map_or(self.emitter_count(), |light| light.first_emitter as usize)
+    }
+
+    /// The `META` section: a JSON text for people.
+    pub fn meta(&self) -> &str {
+        let range = self.container.find::<u8>(records::META).ok().flatten();
+        let bytes: &[u8] = range.as_ref().map_or(&[], |range| self.container.view(range));
+        std::str::from_utf8(bytes).unwrap_or_default()
+    }
+
+    /// The section table.
+    pub fn sections(&self) -> &[Section] {
+        self.container.sections()
+    }
+
+    /// Length of the file in bytes.
+    pub fn byte_length(&self) -> usize {
+        self.container.bytes().len()
+    }
+
+    /// Compares all checksums.
+    pub(super) fn verify_checksums(&self) -> Result<(), StoreError> {
+        self.container.verify_checksums()
+    }
+
+    /// The row of the tree that a frame samples: `Ok(None)` if nothing shines then.
+    ///
+    /// # Errors
+    /// [`NoSuchFrame`] if lights move and the file was built without this frame.
+    pub fn tree_at(&self, frame: i32) -> Result<Option<u32>, NoSuchFrame> {
+        if self.frames.is_none() {
+            return Ok((!self.trees().is_empty()).then_some(0));
+        }
+        let frames = self.frames();
+        match frames.binary_search_by_key(&frame, |row| row.frame) {
+            Ok(found) => Ok(Some(frames[found].tree).filter(|&tree| tree != NO_TREE)),
+            Err(_) => Err(NoSuchFrame {
+                frame,
+                first: frames.first().map_or(0, |row| row.frame),
+                last: frames.last().map_or(0, |row| row.frame),
+            }),
+        }
+    }
+
+    /// What the leaves of a tree stand for, from left to right, with their numbers.
+    pub fn contents(&self, tree: &TreeRow) -> impl Iterator<Item = (u32, LeafContent)> + '_ {
+        let first = tree.first_leaf as usize;
+        let leaves = self.leaves().get(first..).unwrap_or_default();
+        let leaves = &leaves[..leaves.len().min(tree.leaf_count as usize)];
+        leaves.iter().zip(tree.first_leaf..).map(|(&code, leaf)| (leaf, LeafContent::decode(code)))
+    }
+}
+
+/// Lights move and the tree was built for other frames.
+#[derive(Debug, thiserror::Error, PartialEq, Eq)]
+#[error(
+    "the tree has no frame {frame}: lights move and it was built for frames {first} to {last}; build it again with `--frames`"
+)]
+pub struct NoSuchFrame {
+    /// The frame asked for.
+    pub frame: i32,
+    /// The first frame of the file.
+    pub first: i32,
+    /// The last frame of the file.
+    pub last: i32,
+}

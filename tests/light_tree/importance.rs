@@ -1,0 +1,97 @@
+//! Importance 0 is a proof of darkness, and importance has no unit but the light's.
+
+use crate::support::{emitters, receiver, tree_over};
+use candelabra::bounds::LightBounds;
+use candelabra::light_tree::{Link, Node, Receiver};
+use glam::Vec3;
+use proptest::prelude::*;
+
+/// Whether anything inside the bounds could light the receiver: tried at points of the box and for
+/// normals of the cone, in double precision.
+fn can_light(bounds: &LightBounds, receiver: &Receiver) -> bool {
+    let steps = [0.0, 0.25, 0.5, 0.75, 1.0];
+    let (min, extent) = (bounds.aabb.min.as_dvec3(), bounds.aabb.extent().as_dvec3());
+    let (axis, normal) = (bounds.cone.axis.as_dvec3(), receiver.normal.as_dvec3());
+    let reach = f64::from(bounds.cone.theta_o + bounds.cone.theta_e).min(std::f64::consts::PI);
+    steps.iter().any(|x| {
+        steps.iter().any(|y| {
+            steps.iter().any(|z| {
+                let p = min + extent * glam::DVec3::new(*x, *y, *z);
+                let Some(to_light) = (p - receiver.point.as_dvec3()).try_normalize() else {
+                    return true;
+                };
+                let received = receiver.normal == Vec3::ZERO || normal.dot(to_light) > 1e-6;
+                let cosine = axis.normalize().dot(-to_light);
+                let cosine = if bounds.cone.two_sided { cosine.abs() } else { cosine };
+                received && cosine.clamp(-1.0, 1.0).acos() < reach - 1e-6
+            })
+        })
+    })
+}
+
+proptest! {
+    #[test]
+    fn zero_importance_means_no_light(bounds in emitters(60), receiver in receiver()) {
+        let tree = tree_over(&bounds);
+        // Emitters that light the receiver, by leaf; then no cluster above one may be called dark.
+        for bounds in &bounds {
+            let node = Node::encode(bounds, Link::Leaf(0));
+            prop_assert!(node.importance(&receiver) > 0.0 || !can_light(bounds, &receiver));
+        }
+        let mut open = vec![tree.trees()[0].root];
+        while let Some(node) = open.pop() {
+            if node.importance(&receiver) == 0.0 {
+                let mut below = vec![node];
+                while let Some(node) = below.pop() {
+                    match node.link() {
+                        Link::Inner(at) => below.extend(tree.pairs()[at as usize]),
+                        Link::Leaf(leaf) => {
+                            let emitter = tree.leaves()[leaf as usize] as usize;
+                            prop_assert!(!can_light(&bounds[emitter], &receiver));
+                        }
+                    }
+                }
+            } else if let Link::Inner(at) = node.link() {
+                open.extend(tree.pairs()[at as usize]);
+            }
+        }
+    }
+
+    #[test]
+    fn importance_is_positive_finite_and_scales_like_irradiance(
+        bounds in emitters(2), receiver in receiver(), exponent in -20i32..20
+    ) {
+        let scale = 2f32.powi(exponent);
+        let scaled_bounds = LightBounds {
+            aabb: candelabra::bounds::Aabb {
+                min: bounds[0].aabb.min * scale,
+                max: bounds[0].aabb.max * scale,
+            },
+            ..bounds[0]
+        };
+        let at = Node::encode(&bounds[0], Link::Leaf(0)).importance(&receiver);
+        let scaled = Node::encode(&scaled_bounds, Link::Leaf(0))
+            .importance(&Receiver { point: receiver.point * scale, ..receiver });
+        prop_assert!(at >= 0.0 && at.is_finite());
+        let expected = at / f64::from(scale).powi(2);
+        prop_assert!((scaled - expected).abs() <= 1e-5 * expected, "{scaled} {expected}");
+    }
+}
+
+#[test]
+fn a_point_obeys_the_inverse_square_and_the_cosine() {
+    let bounds = LightBounds {
+        aabb: candelabra::bounds::Aabb::around([Vec3::new(0.0, 0.0, 2.0)]),
+        cone: candelabra::bounds::Cone::ALL,
+        energy: 8.0,
+    };
+    let node = Node::encode(&bounds, Link::Leaf(0));
+    let facing = Receiver { point: Vec3::ZERO, normal: Vec3::Z };
+    assert!((node.importance(&facing) - 2.0).abs() < 1e-6);
+    let tilted = Receiver { normal: Vec3::new(0.6, 0.0, 0.8), ..facing };
+    assert!((node.importance(&tilted) - 1.6).abs() < 1e-6);
+    let away = Receiver { normal: -Vec3::Z, ..facing };
+    assert_eq!(node.importance(&away), 0.0);
+    let inside = Receiver { point: Vec3::new(0.0, 0.0, 2.0), normal: Vec3::Z };
+    assert!(node.importance(&inside).is_finite() && node.importance(&inside) > 1e6);
+}
