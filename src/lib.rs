@@ -1,5 +1,6 @@
 //! Candelabra: light trees for scenes with very many lights.
 pub mod bounds;
+pub mod emitter;
 pub mod light_tree;
 pub mod math;
 pub mod scene;

@@ -29,9 +29,10 @@ impl Cone {
         Cone { axis: normal, theta_o: 0.0, theta_e: FRAC_PI_2, two_sided }
     }
 
-    /// Directions within `theta_e` radians of an axis: spots and shaped lights.
-    pub fn spot(axis: Vec3, theta_e: f32) -> Cone {
-        Cone { axis, theta_o: 0.0, theta_e, two_sided: false }
+    /// Directions within a half angle of an axis, radians in `[0, pi]`: spots and shaped lights.
+    pub fn spot(axis: Vec3, half_angle: f32) -> Cone {
+        let theta_e = half_angle.min(FRAC_PI_2);
+        Cone { axis, theta_o: half_angle.min(PI) - theta_e, theta_e, two_sided: false }
     }
 
     /// The smallest cone around two (HPG 2018, Algorithm 1). Where either is two-sided the result

@@ -69,6 +69,16 @@ impl Scene {
         Pose::evaluate(&self.nodes, time_s)
     }
 
+    /// For each node, whether it moves with time.
+    pub fn moving_nodes(&self) -> Vec<bool> {
+        pose::moving(&self.nodes)
+    }
+
+    /// The material of a mesh, if it has one of its own.
+    pub fn material_of(&self, mesh: u32) -> Option<&Material> {
+        self.meshes[mesh as usize].material.map(|material| &self.materials[material as usize])
+    }
+
     /// The prim path of an instance, such as `/World/Lamps/lamp_12`.
     pub fn instance_path(&self, instance: usize) -> &str {
         &self.instances[instance].path

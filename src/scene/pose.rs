@@ -98,6 +98,16 @@ impl Pose {
     }
 }
 
+/// Which nodes move: those with channels, and all below them.
+pub(super) fn moving(nodes: &[Node]) -> Vec<bool> {
+    let mut moves: Vec<bool> = Vec::with_capacity(nodes.len());
+    for node in nodes {
+        let carried = node.parent.is_some_and(|parent| moves[parent as usize]);
+        moves.push(carried || !node.channels.is_empty());
+    }
+    moves
+}
+
 impl Node {
     /// A node that stands still.
     pub fn fixed(path: impl Into<String>, parent: Option<u32>, local: Trs) -> Node {

@@ -80,7 +80,7 @@ impl Texture {
         top.lerp(bottom, fraction.y)
     }
 
-    /// One texel by column and row; neighbours of the edge wrap.
+    /// One texel by column and row, wrapped if they are outside.
     pub fn texel(&self, x: i64, y: i64) -> Vec4 {
         let column = self.wrap[0].index(x, self.width);
         let row = self.wrap[1].index(y, self.height);
@@ -107,12 +107,16 @@ impl Wrap {
         }
     }
 
-    /// Brings a texel index at most one step outside back inside.
+    /// Brings a texel index back inside.
     fn index(self, i: i64, size: u32) -> usize {
         let size = i64::from(size);
         let inside = match self {
             Wrap::Repeat => i.rem_euclid(size),
-            Wrap::Mirror | Wrap::Clamp => i.clamp(0, size - 1),
+            Wrap::Mirror => {
+                let there_and_back = i.rem_euclid(2 * size);
+                there_and_back.min(2 * size - 1 - there_and_back)
+            }
+            Wrap::Clamp => i.clamp(0, size - 1),
         };
         inside as usize
     }

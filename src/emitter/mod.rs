@@ -1,0 +1,23 @@
+//! Floor 2: scene -> emitters, their bounds, and light from a point of them.
+//!
+//! [`Emitters`] lists what a scene's lights are made of: triangles of mesh lights, spheres, points
+//! and spots, in canonical order. [`PosedEmitters`] puts them where a frame has them: it gives the
+//! bounds that a tree is built over, takes a sample of one emitter for a receiver, and tells the
+//! radiance and the sampling density of one that a ray has hit, so that both ways of finding light
+//! can be weighed against each other. [`InfiniteLight`]s, suns and domes, stay outside the tree.
+//!
+//! This room does not know the tree; which emitter to sample is decided elsewhere.
+
+mod dome;
+mod infinite;
+mod posed;
+mod set;
+mod shaping;
+mod sphere;
+mod texels;
+mod triangle;
+
+pub use infinite::{InfiniteLight, InfiniteSample, infinite_lights};
+pub use posed::{EmitterHit, LightOverflow, LightSample, PosedEmitters};
+pub use set::{EmitterRef, Emitters, LightEntry, LightSource};
+pub use sphere::WorldSphere;

@@ -1,0 +1,310 @@
+//! Emitters at one time: their bounds, and light from a point of them.
+
+use super::set::{Emitters, LightSource};
+use super::sphere::WorldSphere;
+use super::triangle::WorldTriangle;
+use crate::bounds::{Aabb, Cone, LightBounds};
+use crate::math::color::{Rgb, luminance};
+use crate::scene::{Instance, Light, LightKind, Material, Pose, Scene, Shaping};
+use glam::{Vec2, Vec3};
+use rayon::prelude::*;
+use std::f32::consts::PI;
+
+/// The emitters of a scene, placed by a pose.
+#[derive(Clone, Copy)]
+pub struct PosedEmitters<'a> {
+    /// The scene.
+    pub scene: &'a Scene,
+    /// Its emitters.
+    pub emitters: &'a Emitters,
+    /// Where everything is.
+    pub pose: &'a Pose,
+}
+
+/// A light that `f32` cannot hold.
+#[derive(Clone, Debug, thiserror::Error, PartialEq, Eq)]
+#[error("{path}: its position or its intensity times its area is beyond the range of numbers (3e38); scale it down")]
+pub struct LightOverflow {
+    /// Prim path of the light.
+    pub path: String,
+}
+
+/// Light from a point of an emitter towards a receiver.
+#[derive(Clone, Copy, Debug)]
+pub struct LightSample {
+    /// Unit, from the receiver.
+    pub direction: Vec3,
+    /// Metres.
+    pub distance: f32,
+    /// Radiance, nits; from a point or a spot the irradiance of a facing surface, lux.
+    pub radiance: Rgb,
+    /// Density over solid angle, 1/sr; `None` for a point or a spot, which no ray can hit.
+    pub pdf: Option<f32>,
+}
+
+/// A place on an emitter that a ray has hit.
+#[derive(Clone, Copy, Debug)]
+pub struct EmitterHit {
+    /// Which emitter.
+    pub emitter: u32,
+    /// Barycentric coordinates of the second and third corner, on a triangle.
+    pub barycentric: Vec2,
+    /// World space, metres.
+    pub point: Vec3,
+}
+
+impl<'a> PosedEmitters<'a> {
+    /// The bounds of all emitters that stand still, or of all that move, in their order.
+    ///
+    /// # Errors
+    /// The path of a light whose place or energy is beyond `f32`.
+    pub fn bounds(&self, moving: bool) -> Result<Vec<LightBounds>, LightOverflow> {
+        let split = self.emitters.static_count() as u32;
+        let range = if moving { split..self.emitters.len() as u32 } else { 0..split };
+        range.into_par_iter().map(|emitter| self.bounds_of(emitter)).collect()
+    }
+
+    /// The bounds of one emitter. Energy is peak radiant intensity: `I` of a point, `L A` of a
+    /// triangle, `L pi r^2` of a sphere, in luminance; never quite zero, so that an emitter which a
+    /// transform has flattened keeps its place in the tree.
+    fn bounds_of(&self, emitter: u32) -> Result<LightBounds, LightOverflow> {
+        let light = self.emitters.light_of(emitter);
+        let mut bounds = match light.source {
+            LightSource::Instance(row) => self.bounds_of_triangle(emitter, row),
+            LightSource::Light(row) => self.bounds_of_light(row),
+        };
+        bounds.energy = bounds.energy.max(f32::MIN_POSITIVE);
+        if bounds.is_sound() { Ok(bounds) } else { Err(LightOverflow { path: light.path.clone() }) }
+    }
+
+    fn bounds_of_triangle(&self, emitter: u32, row: u32) -> LightBounds {
+        let instance = &self.scene.instances[row as usize];
+        let material = self.material(instance);
+        let triangle = self.triangle(instance, self.emitters.get(emitter).triangle);
+        let radiance = material.emission_nits * self.emitters.texture_mean(emitter);
+        let facing = Cone::flat(
+            triangle.area_normal().normalize_or(Vec3::Z) * self.handedness(instance),
+            material.double_sided,
+        );
+        let cone = match instance.shaping {
+            Some(shaping) if shaping.half_angle_rad() < PI / 2.0 => {
+                Cone::spot(self.aim(instance.node), shaping.half_angle_rad())
+            }
+            _ => facing,
+        };
+        LightBounds {
+            aabb: Aabb::around(triangle.corners),
+            cone,
+            energy: luminance(radiance) * triangle.area(),
+        }
+    }
+
+    fn bounds_of_light(&self, row: u32) -> LightBounds {
+        let light = &self.scene.lights[row as usize];
+        let here = Vec3::from(self.pose.world(light.node).translation);
+        let aimed = |shaping: &Shaping| Cone::spot(self.aim(light.node), shaping.half_angle_rad());
+        match &light.kind {
+            LightKind::Point { intensity_cd } => LightBounds {
+                aabb: Aabb::around([here]),
+                cone: Cone::ALL,
+                energy: luminance(*intensity_cd),
+            },
+            LightKind::Spot { intensity_cd, shaping } => LightBounds {
+                aabb: Aabb::around([here]),
+                cone: aimed(shaping),
+                energy: luminance(*intensity_cd),
+            },
+            LightKind::Sphere { radiance_nits, shaping, .. } => {
+                let sphere = self.sphere(light);
+                LightBounds {
+                    aabb: Aabb { min: here - sphere.radius, max: here + sphere.radius },
+                    cone: shaping.as_ref().map_or(Cone::ALL, aimed),
+                    energy: luminance(*radiance_nits) * PI * sphere.radius * sphere.radius,
+                }
+            }
+            LightKind::Distant { .. } | LightKind::Dome { .. } => {
+                unreachable!("lights at infinity are no emitters")
+            }
+        }
+    }
+
+    /// Light from an emitter to a receiver; `None` if this point of it gives none.
+    pub fn sample(&self, emitter: u32, receiver: Vec3, u: Vec2) -> Option<LightSample> {
+        match self.emitters.light_of(emitter).source {
+            LightSource::Instance(row) => {
+                let instance = &self.scene.instances[row as usize];
+                let triangle = self.triangle(instance, self.emitters.get(emitter).triangle);
+                let found = triangle.sample(receiver, u)?;
+                let to_light = triangle.at(found.barycentric) - receiver;
+                let distance = to_light.length();
+                let direction = to_light / distance;
+                let radiance = self.triangle_radiance(
+                    emitter,
+                    instance,
+                    &triangle,
+                    found.barycentric,
+                    direction,
+                );
+                (radiance != Rgb::ZERO).then_some(LightSample {
+                    direction,
+                    distance,
+                    radiance,
+                    pdf: Some(found.pdf),
+                })
+            }
+            LightSource::Light(row) => {
+                self.sample_light(&self.scene.lights[row as usize], receiver, u)
+            }
+        }
+    }
+
+    fn sample_light(&self, light: &Light, receiver: Vec3, u: Vec2) -> Option<LightSample> {
+        let shaped = |shaping: &Option<Shaping>, direction: Vec3| {
+            shaping.map_or(Rgb::ONE, |s| s.factor((-direction).dot(self.aim(light.node))))
+        };
+        let sample = match &light.kind {
+            LightKind::Point { intensity_cd } => {
+                self.from_point(light, receiver, *intensity_cd, &None)?
+            }
+            LightKind::Spot { intensity_cd, shaping } => {
+                self.from_point(light, receiver, *intensity_cd, &Some(*shaping))?
+            }
+            LightKind::Sphere { radiance_nits, shaping, .. } => {
+                let found = self.sphere(light).sample(receiver, u)?;
+                LightSample {
+                    direction: found.direction,
+                    distance: found.distance,
+                    radiance: *radiance_nits * shaped(shaping, found.direction),
+                    pdf: Some(found.pdf),
+                }
+            }
+            LightKind::Distant { .. } | LightKind::Dome { .. } => return None,
+        };
+        (sample.radiance != Rgb::ZERO).then_some(sample)
+    }
+
+    /// `I / d^2`, with the profile and with glTF's window where the light has a range.
+    fn from_point(
+        &self,
+        light: &Light,
+        receiver: Vec3,
+        intensity_cd: Rgb,
+        shaping: &Option<Shaping>,
+    ) -> Option<LightSample> {
+        let to_light = Vec3::from(self.pose.world(light.node).translation) - receiver;
+        let d2 = to_light.length_squared();
+        let distance = d2.sqrt();
+        if d2 == 0.0 {
+            return None;
+        }
+        let direction = to_light / distance;
+        let profile =
+            shaping.map_or(Rgb::ONE, |s| s.factor((-direction).dot(self.aim(light.node))));
+        let window = light.range_m.map_or(1.0, |range| (1.0 - (distance / range).powi(4)).max(0.0));
+        let radiance = intensity_cd * profile * (window / d2);
+        Some(LightSample { direction, distance, radiance, pdf: None })
+    }
+
+    /// Radiance that a ray sees where it has hit an emitter, nits. `direction` is the ray's, unit.
+    pub fn radiance(&self, hit: &EmitterHit, direction: Vec3) -> Rgb {
+        match self.emitters.light_of(hit.emitter).source {
+            LightSource::Instance(row) => {
+                let instance = &self.scene.instances[row as usize];
+                let triangle = self.triangle(instance, self.emitters.get(hit.emitter).triangle);
+                self.triangle_radiance(hit.emitter, instance, &triangle, hit.barycentric, direction)
+            }
+            LightSource::Light(row) => match &self.scene.lights[row as usize] {
+                Light { node, kind: LightKind::Sphere { radiance_nits, shaping, .. }, .. } => {
+                    let cosine = (-direction).dot(self.aim(*node));
+                    *radiance_nits * shaping.map_or(Rgb::ONE, |s| s.factor(cosine))
+                }
+                _ => Rgb::ZERO,
+            },
+        }
+    }
+
+    /// The density over solid angle with which [`sample`](Self::sample), given this emitter, would
+    /// have found the hit from a receiver, 1/sr.
+    pub fn pdf(&self, hit: &EmitterHit, receiver: Vec3) -> f32 {
+        match self.emitters.light_of(hit.emitter).source {
+            LightSource::Instance(row) => {
+                let instance = &self.scene.instances[row as usize];
+                let triangle = self.triangle(instance, self.emitters.get(hit.emitter).triangle);
+                triangle.pdf(receiver, hit.point)
+            }
+            LightSource::Light(row) => match &self.scene.lights[row as usize] {
+                light if matches!(light.kind, LightKind::Sphere { .. }) => {
+                    self.sphere(light).pdf(receiver)
+                }
+                _ => 0.0,
+            },
+        }
+    }
+
+    fn triangle_radiance(
+        &self,
+        emitter: u32,
+        instance: &Instance,
+        triangle: &WorldTriangle,
+        barycentric: Vec2,
+        direction: Vec3,
+    ) -> Rgb {
+        let material = self.material(instance);
+        let facing = -direction.dot(triangle.area_normal()) * self.handedness(instance);
+        if facing == 0.0 || (facing < 0.0 && !material.double_sided) {
+            return Rgb::ZERO;
+        }
+        let mut radiance = material.emission_nits;
+        if let Some(usage) = material.emission_texture {
+            let mesh = &self.scene.meshes[instance.mesh as usize];
+            if let Some(uvs) = mesh.uv_sets.get(usage.uv_set as usize).filter(|set| !set.is_empty())
+            {
+                let corners = mesh.triangles[self.emitters.get(emitter).triangle as usize];
+                let [a, b, c] = corners.map(|corner| uvs[corner as usize]);
+                let uv = a + (b - a) * barycentric.x + (c - a) * barycentric.y;
+                let texture = &self.scene.textures[usage.texture as usize];
+                radiance *= texture.lookup(usage.map(uv)).truncate();
+            }
+        }
+        match instance.shaping {
+            Some(shaping) => radiance * shaping.factor((-direction).dot(self.aim(instance.node))),
+            None => radiance,
+        }
+    }
+
+    fn material(&self, instance: &Instance) -> &'a Material {
+        self.scene.material_of(instance.mesh).expect("an emitter has a material")
+    }
+
+    /// A triangle in world space.
+    fn triangle(&self, instance: &Instance, triangle: u32) -> WorldTriangle {
+        let mesh = &self.scene.meshes[instance.mesh as usize];
+        let world = self.pose.world(instance.node);
+        let corners = mesh.triangles[triangle as usize];
+        WorldTriangle {
+            corners: corners.map(|c| world.transform_point3(mesh.positions[c as usize])),
+        }
+    }
+
+    /// -1 for an instance whose transform mirrors, whose triangles wind the other way round.
+    fn handedness(&self, instance: &Instance) -> f32 {
+        1f32.copysign(self.pose.world(instance.node).matrix3.determinant())
+    }
+
+    fn sphere(&self, light: &Light) -> WorldSphere {
+        let world = self.pose.world(light.node);
+        let radius = match light.kind {
+            LightKind::Sphere { radius, .. } => radius,
+            _ => 0.0,
+        };
+        WorldSphere {
+            center: world.translation.into(),
+            radius: radius * world.matrix3.x_axis.length(),
+        }
+    }
+
+    /// Where a node aims: its -Z, unit, world space.
+    fn aim(&self, node: u32) -> Vec3 {
+        (-Vec3::from(self.pose.world(node).matrix3.z_axis)).normalize_or(-Vec3::Z)
+    }
+}
