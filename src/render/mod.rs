@@ -4,4 +4,6 @@
 //! ray hits, [`bsdf`] says how it reflects. Neither knows of lights or of the light tree.
 
 pub mod bsdf;
+pub mod camera;
 pub mod rays;
+pub mod surface;
