@@ -3,5 +3,6 @@ pub mod bounds;
 pub mod emitter;
 pub mod light_tree;
 pub mod math;
+pub mod render;
 pub mod scene;
 pub mod store;

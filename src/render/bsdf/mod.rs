@@ -1,0 +1,196 @@
+//! How a surface reflects: Lambert below GGX, glTF's metallic-roughness model.
+//!
+//! A [`Bsdf`] is one shading point, with textures already looked up into a [`SurfaceSample`].
+//! It is opaque and reflects on the side of its frame's normal alone; it knows nothing of
+//! materials, of emission or of the geometric normal (a caller that must not leak light through
+//! bent normals compares `wi` with the geometric normal itself).
+//!
+//! The model, with `w = (1 - cos_h)^5`, `F(F0, F90) = F0 + (F90 - F0) w` (Schlick) and GGX's
+//! directional albedo `E = a + b` from [`albedo`]:
+//!
+//! ```text
+//! f   = m f_metal + (1 - m) (f_coat + diffuse)
+//! f_x = D G2 / (4 cos_o cos_i) * F_x * (1 + F0_x (1 - E) / E)     Turquin 2019, eq. 16
+//! diffuse = base / pi * (1 - albedo of f_coat toward wo)
+//! ```
+//!
+//! So a white metal and a white dielectric both reflect exactly what arrives (up to the table's
+//! interpolation), and `specular = 0` is exactly `base / pi`. The compensation and the diffuse
+//! scale look at `wo` alone: only Lambert and a lossless GGX (`alpha -> 0`) are reciprocal.
+
+pub mod albedo;
+pub mod ggx;
+#[cfg(test)]
+mod tests;
+
+use crate::math::color::Rgb;
+use crate::math::{Frame, warp};
+use albedo::Albedo;
+use glam::{Vec2, Vec3};
+use std::f32::consts::FRAC_1_PI;
+
+/// The smallest GGX alpha, reached at roughness 0.032: smoother surfaces reflect like this one, so
+/// that a mirror stays a finite lobe that next-event estimation can hit.
+pub const ALPHA_MIN: f32 = 1e-3;
+
+/// A material at one point, textures looked up.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SurfaceSample {
+    /// Linear reflectance of the diffuse lobe, or of the metal at normal incidence.
+    pub base_color: Rgb,
+    /// 0 dielectric, 1 metal.
+    pub metallic: f32,
+    /// Perceptual roughness; GGX alpha is its square.
+    pub roughness: f32,
+    /// The dielectric's reflectance at normal incidence:
+    /// `min(((ior - 1) / (ior + 1))^2 * specular_color, 1) * specular`.
+    pub dielectric_f0: Rgb,
+    /// The dielectric's reflectance at grazing incidence (`KHR_materials_specular`: its
+    /// `specular`). With this and `dielectric_f0` at 0 the surface is Lambertian.
+    pub dielectric_f90: f32,
+}
+
+/// A reflecting point. Directions are unit, world space, and point away from the surface; `wo`
+/// must be on the normal's side.
+#[derive(Clone, Copy, Debug)]
+pub struct Bsdf {
+    frame: Frame,
+    diffuse: Rgb,
+    metal_f0: Rgb,
+    dielectric_f0: Rgb,
+    dielectric_f90: f32,
+    metallic: f32,
+    alpha: f32,
+}
+
+/// A direction drawn by [`Bsdf::sample`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BsdfSample {
+    /// Where the light comes from, world space.
+    pub wi: Vec3,
+    /// `f |cos| / pdf`.
+    pub weight: Rgb,
+    /// Density over solid angle, 1/sr; what [`Bsdf::eval`] gives for the same direction.
+    pub pdf: f32,
+}
+
+/// What is the same for every `wi` once `wo` is known.
+struct Lobes {
+    wo: Vec3,
+    /// The specular lobe's colour is `at_normal + toward_grazing * (1 - cos_h)^5`.
+    at_normal: Rgb,
+    toward_grazing: Rgb,
+    /// `base / pi`, less what the specular lobe has already reflected.
+    diffuse: Rgb,
+    /// Probability of choosing the specular lobe.
+    specular_probability: f32,
+}
+
+impl Bsdf {
+    /// The reflection of `sample` about the shading frame. Values outside their range are clamped
+    /// into it; what is not finite counts as 0.
+    pub fn new(sample: &SurfaceSample, frame: Frame) -> Bsdf {
+        let unit = |x: f32| if x.is_finite() { x.clamp(0.0, 1.0) } else { 0.0 };
+        let unit_rgb = |c: Rgb| Rgb::new(unit(c.x), unit(c.y), unit(c.z));
+        let (metallic, roughness) = (unit(sample.metallic), unit(sample.roughness));
+        let base = unit_rgb(sample.base_color);
+        Bsdf {
+            frame,
+            diffuse: base * ((1.0 - metallic) * FRAC_1_PI),
+            metal_f0: base,
+            dielectric_f0: unit_rgb(sample.dielectric_f0),
+            dielectric_f90: unit(sample.dielectric_f90),
+            metallic,
+            alpha: (roughness * roughness).max(ALPHA_MIN),
+        }
+    }
+
+    /// `f(wo, wi) |cos wi|` and the density, 1/sr, with which [`sample`](Self::sample) draws `wi`.
+    /// Both are 0 if either direction is below the horizon.
+    #[inline]
+    pub fn eval(&self, wo: Vec3, wi: Vec3) -> (Rgb, f32) {
+        match self.lobes(wo) {
+            Some(lobes) => self.eval_local(&lobes, self.frame.to_local(wi)),
+            None => (Rgb::ZERO, 0.0),
+        }
+    }
+
+    /// Draws a direction. `None` if `wo` is below the horizon, the surface is black, or the
+    /// reflection went below the horizon: the path then ends without a contribution.
+    #[inline]
+    pub fn sample(&self, wo: Vec3, u_lobe: f32, u: Vec2) -> Option<BsdfSample> {
+        let lobes = self.lobes(wo)?;
+        let wi = if u_lobe < lobes.specular_probability {
+            let h = ggx::sample_normal(lobes.wo, self.alpha, u);
+            (2.0 * lobes.wo.dot(h) * h - lobes.wo).normalize()
+        } else {
+            warp::cosine_hemisphere(u)
+        };
+        let (value, pdf) = self.eval_local(&lobes, wi);
+        if pdf > 0.0 && pdf.is_finite() {
+            Some(BsdfSample { wi: self.frame.to_outer(wi), weight: value / pdf, pdf })
+        } else {
+            None
+        }
+    }
+
+    /// GGX alpha of the specular lobe, at least [`ALPHA_MIN`].
+    #[inline]
+    pub fn alpha(&self) -> f32 {
+        self.alpha
+    }
+
+    /// Reflectance of the specular and of the diffuse lobe toward `wo`; their sum is the share of
+    /// a white environment that the surface reflects.
+    pub fn albedo(&self, wo: Vec3) -> (Rgb, Rgb) {
+        let Some(lobes) = self.lobes(wo) else { return (Rgb::ZERO, Rgb::ZERO) };
+        let part = Albedo::of_ggx(lobes.wo.z, self.alpha);
+        let specular = lobes.at_normal * (part.a + part.b) + lobes.toward_grazing * part.b;
+        (specular, lobes.diffuse / FRAC_1_PI)
+    }
+
+    fn lobes(&self, wo: Vec3) -> Option<Lobes> {
+        let wo = self.frame.to_local(wo);
+        if wo.z <= 0.0 {
+            return None;
+        }
+        let whole = 1.0 - self.metallic;
+        let part = Albedo::of_ggx(wo.z, self.alpha);
+        let lost = (1.0 - part.a - part.b).max(0.0) / (part.a + part.b);
+        let (f0, f90) = (self.dielectric_f0, Rgb::splat(self.dielectric_f90));
+        let coat_gain = Rgb::ONE + f0 * lost;
+        let coat = ((f0 * part.a + f90 * part.b) * coat_gain).min(Rgb::ONE);
+        let metal_gain = Rgb::ONE + self.metal_f0 * lost;
+        let metal = (self.metal_f0 * part.a + part.b) * metal_gain;
+        let diffuse = self.diffuse * (Rgb::ONE - coat);
+        let specular_albedo = (coat * whole + metal * self.metallic).element_sum();
+        let all = specular_albedo + diffuse.element_sum() / FRAC_1_PI;
+        (all > 0.0).then(|| Lobes {
+            wo,
+            at_normal: f0 * coat_gain * whole + self.metal_f0 * metal_gain * self.metallic,
+            toward_grazing: (f90 - f0) * coat_gain * whole
+                + (Rgb::ONE - self.metal_f0) * metal_gain * self.metallic,
+            diffuse,
+            specular_probability: specular_albedo / all,
+        })
+    }
+
+    #[inline]
+    fn eval_local(&self, lobes: &Lobes, wi: Vec3) -> (Rgb, f32) {
+        let (cos_o, cos_i) = (lobes.wo.z, wi.z);
+        if cos_i <= 0.0 {
+            return (Rgb::ZERO, 0.0);
+        }
+        let mut value = lobes.diffuse * cos_i;
+        let mut pdf = (1.0 - lobes.specular_probability) * warp::cosine_hemisphere_pdf(cos_i);
+        if lobes.specular_probability > 0.0 {
+            let h = (lobes.wo + wi).normalize_or(Vec3::Z);
+            let schlick = (1.0 - lobes.wo.dot(h)).clamp(0.0, 1.0).powi(5);
+            let shape =
+                ggx::distribution(h, self.alpha) * ggx::visibility_cos(cos_o, cos_i, self.alpha);
+            value += (lobes.at_normal + lobes.toward_grazing * schlick) * shape;
+            pdf += lobes.specular_probability * ggx::reflection_pdf(cos_o, h, self.alpha);
+        }
+        (value, pdf)
+    }
+}

@@ -1,0 +1,156 @@
+//! A set of triangles that a ray can search: the lower level of the kernel.
+
+use super::triangles::{Block, Ray, ShearedRay, plane_distance};
+use super::wide_bvh::{BoxRay, NONE, WIDTH, WideBvh, bounds_of};
+use glam::{DVec3, Vec3};
+use obvhs::aabb::Aabb;
+use rayon::prelude::*;
+
+/// Coordinates beyond this, in metres, are filtered: products of three of them must stay finite.
+pub const LARGEST_COORDINATE: f32 = 1e12;
+
+/// A triangle's name.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct TriangleId {
+    /// Index into [`Scene::instances`](crate::scene::Scene::instances).
+    pub instance: u32,
+    /// Index into the mesh's triangles.
+    pub triangle: u32,
+}
+
+/// Triangles in one space, blocks in the order of the tree's leaves.
+#[derive(Debug, Default)]
+pub struct Blas {
+    tree: WideBvh,
+    blocks: Vec<Block>,
+    ids: Vec<[TriangleId; WIDTH]>,
+    bounds: Option<(Vec3, Vec3)>,
+}
+
+/// Where a ray meets a triangle of a [`Blas`], in its space.
+#[derive(Clone, Copy, Debug)]
+pub struct BlasHit {
+    /// In lengths of the ray's direction.
+    pub t: f64,
+    /// Which triangle.
+    pub id: TriangleId,
+    /// Its corners.
+    pub corners: [DVec3; 3],
+}
+
+impl Blas {
+    /// Builds over triangles. Those with a coordinate that is not finite or beyond 1e12, and those
+    /// without area, are left out: no ray meets them.
+    pub fn build(triangles: &[[Vec3; 3]], ids: &[TriangleId]) -> Blas {
+        let kept: Vec<u32> = (0..triangles.len() as u32)
+            .into_par_iter()
+            .filter(|&i| can_be_hit(&triangles[i as usize]))
+            .collect();
+        let boxes: Vec<Aabb> =
+            kept.par_iter().map(|&i| bounds_of(&triangles[i as usize])).collect();
+        let (tree, leaves) = WideBvh::build(&boxes, WIDTH as u32);
+        let filled = leaves.par_iter().map(|leaf| {
+            let (mut block, mut names) = (Block::EMPTY, [TriangleId::default(); WIDTH]);
+            for (lane, &entry) in leaf.iter().enumerate().filter(|&(_, &entry)| entry != NONE) {
+                let triangle = kept[entry as usize] as usize;
+                block.set(lane, triangles[triangle]);
+                names[lane] = ids[triangle];
+            }
+            (block, names)
+        });
+        let (blocks, ids) = filled.unzip();
+        let whole = boxes.iter().copied().reduce(|a, b| a.union(&b));
+        let bounds = whole.map(|whole| (Vec3::from(whole.min), Vec3::from(whole.max)));
+        Blas { tree, blocks, ids, bounds }
+    }
+
+    /// Lower and upper corner of all triangles; `None` if there are none.
+    pub fn bounds(&self) -> Option<(Vec3, Vec3)> {
+        self.bounds
+    }
+
+    /// The nearest accepted triangle with `0 < t < tmax`.
+    #[inline]
+    pub fn closest(
+        &self,
+        ray: &Ray,
+        tmax: f64,
+        accept: impl Fn(&BlasHit) -> bool,
+    ) -> Option<BlasHit> {
+        self.search::<true>(ray, tmax, accept)
+    }
+
+    /// Whether any accepted triangle has `0 < t < tmax`.
+    #[inline]
+    pub fn occluded(&self, ray: &Ray, tmax: f64, accept: impl Fn(&BlasHit) -> bool) -> bool {
+        self.search::<false>(ray, tmax, accept).is_some()
+    }
+
+    fn search<const CLOSEST: bool>(
+        &self,
+        ray: &Ray,
+        tmax: f64,
+        accept: impl Fn(&BlasHit) -> bool,
+    ) -> Option<BlasHit> {
+        let d = ray.direction.abs();
+        if d.x >= d.y && d.x >= d.z {
+            self.search_along::<CLOSEST, 0>(ray, tmax, accept)
+        } else if d.y >= d.z {
+            self.search_along::<CLOSEST, 1>(ray, tmax, accept)
+        } else {
+            self.search_along::<CLOSEST, 2>(ray, tmax, accept)
+        }
+    }
+
+    fn search_along<const CLOSEST: bool, const KZ: usize>(
+        &self,
+        ray: &Ray,
+        tmax: f64,
+        accept: impl Fn(&BlasHit) -> bool,
+    ) -> Option<BlasHit> {
+        let (origin, direction) = (ray.origin.as_vec3(), ray.direction.as_vec3());
+        let box_ray = BoxRay::new(origin, direction);
+        let sheared = ShearedRay::<KZ>::new(origin, direction);
+        let mut best = tmax;
+        let mut bound = round_up(tmax);
+        let mut found = None;
+        self.tree.walk::<CLOSEST>(&box_ray, bound, |leaf| {
+            let block = &self.blocks[leaf as usize];
+            let mut lanes = block.candidates(&sheared, bound);
+            while lanes != 0 {
+                let lane = lanes.trailing_zeros() as usize % WIDTH;
+                lanes &= lanes - 1;
+                let corners = block.get(lane);
+                let Some(t) = plane_distance(ray, corners) else { continue };
+                if !(t > 0.0 && t < best) {
+                    continue;
+                }
+                let hit = BlasHit { t, id: self.ids[leaf as usize][lane], corners };
+                if !accept(&hit) {
+                    continue;
+                }
+                found = Some(hit);
+                if !CLOSEST {
+                    return -1.0;
+                }
+                best = t;
+                bound = round_up(t);
+            }
+            bound
+        });
+        found
+    }
+}
+
+/// Not below `t`, in single precision.
+fn round_up(t: f64) -> f32 {
+    (t as f32).next_up()
+}
+
+fn can_be_hit(&[a, b, c]: &[Vec3; 3]) -> bool {
+    let small = |p: Vec3| p.abs().cmple(Vec3::splat(LARGEST_COORDINATE)).all();
+    small(a) && small(b) && small(c) && {
+        let (a, b, c) = (a.as_dvec3(), b.as_dvec3(), c.as_dvec3());
+        (b - a).cross(c - a) != DVec3::ZERO
+    }
+}

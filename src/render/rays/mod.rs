@@ -1,0 +1,151 @@
+//! The ray kernel: what a ray hits, and whether anything stands between two points.
+//!
+//! Two levels. [`RayScene`] is prepared once for a shot: one world-space set of triangles for all
+//! that stands still, and one local-space set for each mesh that moves or is shared by so many
+//! instances that copies would cost memory. [`Tracer`] is one frame of it: a small tree over the
+//! placed meshes and the sphere lights, built for a [`Pose`].
+//!
+//! What callers may rely on:
+//!
+//! - The hit nearest to the origin at a distance in the open interval `(0, tmax)`, found
+//!   watertight (see [`triangles`]) and measured in double precision. There is no scene epsilon.
+//!   Coordinates from 1e-9 to 1e9 metres are tested; beyond 1e12 they are filtered.
+//! - A ray that starts at [`Anchor::origin_toward`] does not meet the surface it left.
+//! - Triangles are two-sided; the normal is the front's, which counts the corners
+//!   counter-clockwise, and clockwise under a mirroring transform (glTF 2.0, 3.7.4).
+//! - Sphere lights are surfaces that a ray hits from outside and from inside.
+//!
+//! Not here: shading (`surface`), and what happens at a cut-out, which the caller decides through
+//! the `accept` function; it is asked only about meshes whose material has a coverage.
+
+mod anchor;
+mod blas;
+mod sphere;
+#[cfg(test)]
+mod tests;
+mod tracer;
+mod triangles;
+mod wide_bvh;
+
+pub use anchor::Anchor;
+pub use tracer::{Hit, HitSurface, Tracer};
+
+use crate::scene::{AlphaMode, Instance, Mesh, Pose, Scene};
+use blas::{Blas, TriangleId};
+use glam::{DAffine3, DMat3, Vec3};
+use rayon::prelude::*;
+use std::collections::HashMap;
+
+/// A mesh whose copies would add more triangles than this keeps one set for all its instances...
+const COPIED_TRIANGLES: usize = 1 << 16;
+/// ...unless it has no more triangles than this, when a copy is cheaper than a reference.
+const TINY_MESH: usize = 32;
+
+/// The geometry of a shot. See the [module page](self).
+#[derive(Debug)]
+pub struct RayScene {
+    /// Everything that stands still and is not shared, in world space.
+    fixed: Blas,
+    /// Sets in local space.
+    shared: Vec<Blas>,
+    /// Instances of the shared sets.
+    placed: Vec<Placed>,
+    /// By instance: its material has a coverage that a hit must ask for.
+    cutout: Vec<bool>,
+}
+
+/// An instance that refers to a shared set.
+#[derive(Clone, Copy, Debug)]
+struct Placed {
+    instance: u32,
+    set: u32,
+}
+
+impl RayScene {
+    /// Prepares what does not change in a shot. `pose` may be that of any of its frames.
+    pub fn new(scene: &Scene, pose: &Pose) -> RayScene {
+        let moving = moving_nodes(scene);
+        let mut uses = vec![0_usize; scene.meshes.len()];
+        for instance in &scene.instances {
+            uses[instance.mesh as usize] += 1;
+        }
+        let is_shared = |instance: &Instance| {
+            let size = scene.meshes[instance.mesh as usize].triangles.len();
+            let copied = (uses[instance.mesh as usize] - 1) * size;
+            moving[instance.node as usize] || (size > TINY_MESH && copied > COPIED_TRIANGLES)
+        };
+        let (mut placed, mut sets, mut flat) = (Vec::new(), HashMap::new(), Vec::new());
+        let mut meshes = Vec::new();
+        for (number, instance) in scene.instances.iter().enumerate() {
+            let number = number as u32;
+            if is_shared(instance) {
+                let set = *sets.entry(instance.mesh).or_insert_with(|| {
+                    meshes.push(instance.mesh);
+                    meshes.len() as u32 - 1
+                });
+                placed.push(Placed { instance: number, set });
+            } else {
+                flat.push(number);
+            }
+        }
+        let local = |&mesh: &u32| {
+            let (triangles, ids) = in_space(&scene.meshes[mesh as usize], 0, DAffine3::IDENTITY);
+            Blas::build(&triangles, &ids)
+        };
+        let parts: Vec<_> = flat.par_iter().map(|&i| in_world(scene, pose, i)).collect();
+        let triangles = parts.iter().flat_map(|part| &part.0).copied().collect::<Vec<_>>();
+        let ids = parts.iter().flat_map(|part| &part.1).copied().collect::<Vec<_>>();
+        drop(parts);
+        RayScene {
+            fixed: Blas::build(&triangles, &ids),
+            shared: meshes.par_iter().map(local).collect(),
+            placed,
+            cutout: scene.instances.iter().map(|instance| is_cutout(scene, instance)).collect(),
+        }
+    }
+
+    /// One frame: only what moves is placed anew. `scene` must be the one this was made of.
+    pub fn for_pose(&self, scene: &Scene, pose: &Pose) -> Tracer<'_> {
+        Tracer::new(self, scene, pose)
+    }
+}
+
+/// Nodes with an animated channel on themselves or above.
+fn moving_nodes(scene: &Scene) -> Vec<bool> {
+    let mut moving = Vec::with_capacity(scene.nodes.len());
+    for node in &scene.nodes {
+        let above = node.parent.is_some_and(|parent| moving[parent as usize]);
+        moving.push(above || !node.channels.is_empty());
+    }
+    moving
+}
+
+fn is_cutout(scene: &Scene, instance: &Instance) -> bool {
+    let material = scene.meshes[instance.mesh as usize].material;
+    material.is_some_and(|m| scene.materials[m as usize].alpha_mode != AlphaMode::Opaque)
+}
+
+/// The triangles of a mesh, transformed in double precision and rounded once.
+fn in_space(mesh: &Mesh, instance: u32, transform: DAffine3) -> (Vec<[Vec3; 3]>, Vec<TriangleId>) {
+    let transformed = |&p: &Vec3| transform.transform_point3(p.as_dvec3()).as_vec3();
+    let points: Vec<Vec3> = mesh.positions.iter().map(transformed).collect();
+    let corners = |triangle: &[u32; 3]| triangle.map(|corner| points[corner as usize]);
+    let triangles = mesh.triangles.iter().map(corners).collect();
+    let ids = (0..mesh.triangles.len() as u32).map(|triangle| TriangleId { instance, triangle });
+    (triangles, ids.collect())
+}
+
+/// The triangles of an instance in world space.
+fn in_world(scene: &Scene, pose: &Pose, instance: u32) -> (Vec<[Vec3; 3]>, Vec<TriangleId>) {
+    let placed = &scene.instances[instance as usize];
+    in_space(&scene.meshes[placed.mesh as usize], instance, world_of(pose, placed.node))
+}
+
+/// Local to world of a node.
+fn world_of(pose: &Pose, node: u32) -> DAffine3 {
+    let world = pose.world(node);
+    let columns = [world.matrix3.x_axis, world.matrix3.y_axis, world.matrix3.z_axis]
+        .map(|column| Vec3::from(column).as_dvec3());
+    let matrix3 = DMat3::from_cols(columns[0], columns[1], columns[2]);
+    DAffine3 { matrix3, translation: Vec3::from(world.translation).as_dvec3() }
+}

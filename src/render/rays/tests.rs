@@ -1,0 +1,502 @@
+//! Laws of the ray kernel, against brute force in double precision.
+
+use super::*;
+use crate::math::color::Rgb;
+use crate::math::random::hash;
+use crate::math::warp;
+use crate::scene::{Channel, Interpolation, Keys, Light, LightKind, Material, Node, Trs};
+use glam::{DQuat, DVec3, Quat, Vec2};
+
+const ALL: fn(u32, u32, Vec2) -> bool = |_, _, _| true;
+
+/// Uniform numbers, the same every time.
+struct Numbers(u32);
+
+impl Numbers {
+    fn next(&mut self) -> f32 {
+        self.0 = hash(self.0, 0x5eed);
+        (self.0 >> 8) as f32 / (1 << 24) as f32
+    }
+    fn point(&mut self) -> Vec3 {
+        Vec3::new(self.next(), self.next(), self.next())
+    }
+    fn direction(&mut self) -> Vec3 {
+        warp::sphere(Vec2::new(self.next(), self.next()))
+    }
+}
+
+fn mesh(triangles: &[[Vec3; 3]]) -> Mesh {
+    let corners = |i: usize| [3 * i as u32, 3 * i as u32 + 1, 3 * i as u32 + 2];
+    Mesh {
+        positions: triangles.iter().flatten().copied().collect(),
+        triangles: (0..triangles.len()).map(corners).collect(),
+        ..Default::default()
+    }
+}
+
+/// A scene of meshes placed by transforms.
+fn scene(meshes: Vec<Mesh>, placed: &[(u32, Trs)]) -> Scene {
+    let mut scene = Scene { meshes, ..Default::default() };
+    for (i, &(mesh, local)) in placed.iter().enumerate() {
+        let path = format!("/prim_{i}");
+        scene.nodes.push(Node::fixed(&path, None, local));
+        scene.instances.push(Instance { path, node: i as u32, mesh, shaping: None, forced: false });
+    }
+    scene
+}
+
+fn soup(numbers: &mut Numbers, count: usize, scale: f32) -> Vec<[Vec3; 3]> {
+    (0..count)
+        .map(|_| {
+            let at = numbers.point();
+            [0, 1, 2].map(|_| (at + (numbers.point() - 0.5) * 0.3) * scale)
+        })
+        .collect()
+}
+
+/// World-space triangles of a scene in double precision, by instance and triangle.
+fn world_triangles(scene: &Scene, pose: &Pose) -> Vec<(u32, u32, [DVec3; 3])> {
+    let mut all = Vec::new();
+    for (i, instance) in scene.instances.iter().enumerate() {
+        let mesh = &scene.meshes[instance.mesh as usize];
+        let world = world_of(pose, instance.node);
+        for (t, corners) in mesh.triangles.iter().enumerate() {
+            let place = |c: u32| world.transform_point3(mesh.positions[c as usize].as_dvec3());
+            all.push((i as u32, t as u32, corners.map(place)));
+        }
+    }
+    all
+}
+
+/// Nearest `(t, instance, triangle)`, and how far inside the triangle: its smallest weight.
+fn brute(all: &[(u32, u32, [DVec3; 3])], o: Vec3, d: Vec3) -> Option<(f64, u32, u32, f64)> {
+    let (o, d) = (o.as_dvec3(), d.as_dvec3());
+    let mut best: Option<(f64, u32, u32, f64)> = None;
+    for &(instance, triangle, [a, b, c]) in all {
+        let (ab, ac) = (b - a, c - a);
+        let p = d.cross(ac);
+        let det = ab.dot(p);
+        let s = o - a;
+        let u = s.dot(p) / det;
+        let q = s.cross(ab);
+        let (v, t) = (d.dot(q) / det, ac.dot(q) / det);
+        let inside = u.min(v).min(1.0 - u - v);
+        if inside >= 0.0 && t > 0.0 && best.is_none_or(|found| t < found.0) {
+            best = Some((t, instance, triangle, inside));
+        }
+    }
+    best
+}
+
+/// Traces random rays through a scene and demands what brute force says. Rays that pass within
+/// rounding of an edge may go either way.
+fn agree(scene: &Scene, time_s: f64, center: Vec3, scale: f32, rays: usize) {
+    let pose = scene.pose_at(time_s);
+    let prepared = RayScene::new(scene, &scene.pose_at(0.0));
+    let tracer = prepared.for_pose(scene, &pose);
+    let all = world_triangles(scene, &pose);
+    let mut numbers = Numbers(17);
+    let (mut hits, mut unsure) = (0, 0);
+    for _ in 0..rays {
+        let origin = center + (numbers.point() * 3.0 - 1.5) * scale;
+        // Most aim at a triangle.
+        let [a, b, c] = all[(numbers.next() * all.len() as f32) as usize % all.len()].2;
+        let uv = warp::triangle(Vec2::new(numbers.next(), numbers.next())).as_dvec2();
+        let aim = a + (b - a) * uv.x + (c - a) * uv.y;
+        let aimed = (aim - origin.as_dvec3()).normalize().as_vec3();
+        let direction = if numbers.next() < 0.7 { aimed } else { numbers.direction() };
+        let found = tracer.closest(origin, direction, f32::INFINITY, &ALL);
+        let expected = brute(&all, origin, direction);
+        let name = found.map(|hit| match hit.surface {
+            HitSurface::Triangle { instance, triangle, .. } => (instance, triangle),
+            HitSurface::Sphere { .. } => panic!("there are no spheres"),
+        });
+        if name != expected.map(|e| (e.1, e.2)) {
+            let margin = expected.map_or(0.0, |e| e.3);
+            assert!(
+                margin < 1e-4,
+                "found {found:?}, expected {expected:?} from {origin} {direction}"
+            );
+            unsure += 1;
+            continue;
+        }
+        let Some((t, ..)) = expected else { continue };
+        let hit = found.unwrap();
+        hits += 1;
+        assert!((f64::from(hit.t) / t - 1.0).abs() < 1e-5, "{} {t}", hit.t);
+        // The anchor is on the surface within its error, and the barycentrics lead to it.
+        let HitSurface::Triangle { instance, triangle, barycentric } = hit.surface else { return };
+        let corners = all.iter().find(|c| (c.0, c.1) == (instance, triangle)).unwrap().2;
+        let [a, b, c] = corners;
+        let plane = (b - a).cross(c - a).normalize();
+        let off = plane.dot(hit.anchor.position.as_dvec3() - a).abs();
+        // A copy in world space is rounded once more than the instance it came from.
+        let rounding = f64::from(f32::EPSILON) * a.abs().max(b.abs()).max(c.abs()).max_element();
+        assert!(off <= f64::from(hit.anchor.error_m) + 2.0 * rounding, "{off} {:?}", hit.anchor);
+        let [u, v] = barycentric.to_array().map(f64::from);
+        let at = a + (b - a) * u + (c - a) * v;
+        let size = (b - a).length().max((c - a).length());
+        assert!((at - hit.anchor.position.as_dvec3()).length() < 1e-5 * size + 4.0 * rounding);
+        let limit = hit.t;
+        assert!(tracer.occluded(origin, direction, limit.next_up(), &ALL));
+        assert!(!tracer.occluded(origin, direction, limit * (1.0 - 1e-6), &ALL));
+        assert!(tracer.closest(origin, direction, limit * (1.0 - 1e-6), &ALL).is_none());
+    }
+    assert!(hits * 4 > rays, "only {hits} hits of {rays}");
+    assert!(unsure * 200 < rays, "{unsure} rays disagree at an edge");
+}
+
+#[test]
+fn random_triangles_agree_with_brute_force_at_every_scale() {
+    for scale in [1e-9, 1e-6, 1e-3, 1.0, 1e3, 1e6, 1e9] {
+        let mut numbers = Numbers(3);
+        let triangles = soup(&mut numbers, 300, scale);
+        let scene = scene(vec![mesh(&triangles)], &[(0, Trs::default())]);
+        agree(&scene, 0.0, Vec3::splat(0.5 * scale), scale, 2000);
+    }
+}
+
+fn parts(translation: DVec3, rotation: DQuat, scale: DVec3) -> Trs {
+    Trs::Parts { translation, rotation, scale }
+}
+
+/// Transforms with rotation, mirroring, shear and uneven scale.
+fn transforms() -> Vec<Trs> {
+    let turn = DQuat::from_rotation_y(0.7) * DQuat::from_rotation_x(0.3);
+    let shear = DAffine3::from_mat3(DMat3::from_cols(
+        DVec3::X,
+        DVec3::new(0.5, 1.0, 0.0),
+        DVec3::new(0.0, -0.3, 0.8),
+    ));
+    vec![
+        parts(DVec3::new(-2.0, 0.0, 0.0), turn, DVec3::ONE),
+        parts(DVec3::new(2.0, 0.0, 0.0), turn, DVec3::new(-1.0, 1.0, 1.0)),
+        parts(DVec3::new(0.0, 2.0, 0.0), DQuat::IDENTITY, DVec3::new(0.3, 2.0, 1.0)),
+        Trs::Matrix(shear),
+    ]
+}
+
+#[test]
+fn copied_instances_agree_with_brute_force() {
+    let triangles = soup(&mut Numbers(4), 100, 1.0);
+    let placed: Vec<_> = transforms().into_iter().map(|trs| (0, trs)).collect();
+    agree(&scene(vec![mesh(&triangles)], &placed), 0.0, Vec3::splat(0.5), 2.0, 2000);
+}
+
+/// A node whose only channel turns it about +Y, a radian a second.
+fn turning(mut node: Node) -> Node {
+    let keys = (0..=4).map(|i| i as f32 * 0.5);
+    node.channels.push(Channel::Rotation(Keys {
+        times_s: keys.clone().collect(),
+        values: keys.map(Quat::from_rotation_y).collect(),
+        interpolation: Interpolation::Linear,
+    }));
+    node
+}
+
+#[test]
+fn moving_instances_agree_with_brute_force() {
+    let triangles = soup(&mut Numbers(5), 100, 1.0);
+    let mut placed: Vec<_> = transforms()
+        .into_iter()
+        .filter(|t| matches!(t, Trs::Parts { .. }))
+        .map(|t| (0, t))
+        .collect();
+    placed.push((1, Trs::default()));
+    let still = soup(&mut Numbers(6), 50, 1.0);
+    let mut scene = scene(vec![mesh(&triangles), mesh(&still)], &placed);
+    for node in &mut scene.nodes[..3] {
+        *node = turning(node.clone());
+    }
+    for time_s in [0.0, 0.8, 2.0] {
+        agree(&scene, time_s, Vec3::splat(0.5), 2.0, 1000);
+    }
+    let prepared = RayScene::new(&scene, &scene.pose_at(0.0));
+    assert_eq!((prepared.shared.len(), prepared.placed.len()), (1, 3));
+}
+
+#[test]
+fn instances_far_from_the_origin_and_of_odd_scale_keep_their_hits() {
+    let triangles = soup(&mut Numbers(7), 100, 1000.0);
+    let far = DVec3::new(1e5, -2e5, 3e5);
+    let local = parts(far, DQuat::from_rotation_z(1.0), DVec3::splat(1e-3));
+    let mut scene = scene(vec![mesh(&triangles)], &[(0, local)]);
+    // As an instance: a copy would be rounded to a 32nd of a metre out there.
+    scene.nodes[0].channels.push(Channel::Translation(Keys {
+        times_s: vec![0.0],
+        values: vec![far.as_vec3()],
+        interpolation: Interpolation::Step,
+    }));
+    agree(&scene, 0.0, far.as_vec3(), 2.0, 500);
+}
+
+#[test]
+fn a_mesh_shared_by_many_is_kept_once() {
+    let triangles = soup(&mut Numbers(8), 4000, 1.0);
+    let grid =
+        (0..27).map(|i| DVec3::new(f64::from(i % 3), f64::from(i / 3 % 3), f64::from(i / 9)));
+    let placed: Vec<_> = grid.map(|at| (0, parts(at * 2.0, DQuat::IDENTITY, DVec3::ONE))).collect();
+    let scene = scene(vec![mesh(&triangles)], &placed);
+    let prepared = RayScene::new(&scene, &scene.pose_at(0.0));
+    assert_eq!((prepared.shared.len(), prepared.placed.len()), (1, 27));
+    agree(&scene, 0.0, Vec3::splat(2.5), 3.0, 150);
+}
+
+#[test]
+fn the_normal_is_the_fronts_whatever_the_transform() {
+    let triangle = [Vec3::ZERO, Vec3::X, Vec3::Y];
+    for moving in [false, true] {
+        for (scale, front) in
+            [(DVec3::ONE, 1.0), (DVec3::new(1.0, 1.0, -1.0), -1.0), (-DVec3::ONE, -1.0)]
+        {
+            let local = parts(DVec3::ZERO, DQuat::IDENTITY, scale);
+            let mut scene = scene(vec![mesh(&[triangle])], &[(0, local)]);
+            if moving {
+                scene.nodes[0] = turning(scene.nodes[0].clone());
+            }
+            let pose = scene.pose_at(0.0);
+            let prepared = RayScene::new(&scene, &pose);
+            let tracer = prepared.for_pose(&scene, &pose);
+            let s = scale.as_vec3() * Vec3::new(0.2, 0.2, 0.0);
+            let hit = tracer.closest(s + Vec3::Z, -Vec3::Z, 9.0, &ALL).unwrap();
+            assert_eq!(hit.anchor.normal, Vec3::Z * front, "{scale} {moving}");
+        }
+    }
+}
+
+fn with_sphere(radius: f32, at: DVec3, scale: f64) -> Scene {
+    let mut scene = Scene::default();
+    let local = parts(at, DQuat::IDENTITY, DVec3::splat(scale));
+    scene.nodes.push(Node::fixed("/lamp", None, local));
+    let kind = LightKind::Sphere { radiance_nits: Rgb::ONE, radius, shaping: None };
+    scene.lights.push(Light { node: 0, kind, range_m: None, forced: false });
+    scene
+}
+
+#[test]
+fn spheres_are_met_from_outside_and_from_inside() {
+    for scale in [1e-6_f32, 1.0, 1e6] {
+        let center = Vec3::new(3.0, -1.0, 2.0) * scale;
+        let scene = with_sphere(0.5, center.as_dvec3(), f64::from(scale));
+        let pose = scene.pose_at(0.0);
+        let prepared = RayScene::new(&scene, &pose);
+        let tracer = prepared.for_pose(&scene, &pose);
+        let mut numbers = Numbers(9);
+        for _ in 0..500 {
+            let toward = numbers.direction();
+            for (from, sign) in [(2.0, -1.0), (0.3, 1.0)] {
+                let origin = center + toward * (from * scale);
+                let hit = tracer.closest(origin, toward * sign, f32::INFINITY, &ALL).unwrap();
+                assert_eq!(hit.surface, HitSurface::Sphere { light: 0 });
+                assert!((hit.t - (from - 0.5).abs() * scale).abs() < 1e-5 * scale);
+                assert!((hit.anchor.normal - toward).length() < 1e-5);
+                // Outward the sphere is left behind; inward its other side is seen.
+                let away = hit.anchor.origin_toward(toward);
+                assert!(tracer.closest(away, toward, f32::INFINITY, &ALL).is_none());
+                let inward = hit.anchor.origin_toward(-toward);
+                let across = tracer.closest(inward, -toward, f32::INFINITY, &ALL).unwrap();
+                assert!((across.t - scale).abs() < 1e-5 * scale);
+            }
+            let side = toward.any_orthonormal_vector();
+            let past = center + side * (0.51 * scale) - toward * scale;
+            assert!(!tracer.occluded(past, toward, f32::INFINITY, &ALL));
+        }
+    }
+}
+
+#[test]
+fn a_ray_never_meets_the_surface_it_leaves() {
+    // A huge floor with a hit near its middle and far from it, small triangles, and instances.
+    for scale in [1e-6_f32, 1.0, 1e6] {
+        for reach in [1.0, 1e4] {
+            let tilt = DQuat::from_rotation_x(0.3) * DQuat::from_rotation_z(1.1);
+            let corner = |x: f32, z: f32| Vec3::new(x, 0.0, z) * (reach * scale);
+            let (a, b, c, d) =
+                (corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0));
+            let at = DVec3::new(0.3, -0.7, 0.2) * f64::from(scale);
+            let mut floor =
+                scene(vec![mesh(&[[a, c, b], [a, d, c]])], &[(0, parts(at, tilt, DVec3::ONE))]);
+            for moving in [false, true] {
+                if moving {
+                    floor.nodes[0].channels.push(Channel::Scale(Keys {
+                        times_s: vec![0.0],
+                        values: vec![Vec3::new(1.0, 2.0, 0.7)],
+                        interpolation: Interpolation::Step,
+                    }));
+                }
+                let pose = floor.pose_at(0.0);
+                let prepared = RayScene::new(&floor, &pose);
+                let tracer = prepared.for_pose(&floor, &pose);
+                let up = pose.world(0).matrix3.y_axis;
+                let up = Vec3::from(up).normalize();
+                let mut numbers = Numbers(10);
+                let (mut hits, mut lamps) = (0, 0);
+                for _ in 0..300 {
+                    let origin = (numbers.point() * 4.0 - 2.0) * scale;
+                    let toward = numbers.direction();
+                    let Some(hit) = tracer.closest(origin, toward, f32::INFINITY, &ALL) else {
+                        continue;
+                    };
+                    hits += 1;
+                    for _ in 0..10 {
+                        let leave = numbers.direction();
+                        let start = hit.anchor.origin_toward(leave);
+                        assert!(!tracer.occluded(start, leave, f32::INFINITY, &ALL), "{hit:?}");
+                    }
+                    // From the floor to a lamp above it, and from the lamp to the floor.
+                    let lamp = Anchor::free(Vec3::from(pose.world(0).translation) + up * scale);
+                    lamps += usize::from(tracer.occluded_between(&hit.anchor, &lamp, &ALL));
+                    lamps += usize::from(tracer.occluded_between(&lamp, &hit.anchor, &ALL));
+                }
+                assert!(hits > 10, "only {hits} hits");
+                assert_eq!(lamps, 0);
+            }
+        }
+    }
+}
+
+#[test]
+fn no_ray_slips_between_triangles() {
+    // A closed sphere of small triangles around every origin: every ray must end on it.
+    let n = 24;
+    let at = |i: usize, j: usize| {
+        let (theta, phi) = (i as f32 / n as f32, (j % (2 * n)) as f32 / n as f32);
+        let (theta, phi) = (theta * std::f32::consts::PI, phi * std::f32::consts::PI);
+        let around = if i.is_multiple_of(n) { 0.0 } else { theta.sin() };
+        Vec3::new(around * phi.cos(), theta.cos(), around * phi.sin()) * 3.0 + 10.0
+    };
+    let mut triangles = Vec::new();
+    for i in 0..n {
+        for j in 0..2 * n {
+            triangles.push([at(i, j), at(i + 1, j), at(i + 1, j + 1)]);
+            triangles.push([at(i, j), at(i + 1, j + 1), at(i, j + 1)]);
+        }
+    }
+    let scene = scene(vec![mesh(&triangles)], &[(0, Trs::default())]);
+    let pose = scene.pose_at(0.0);
+    let prepared = RayScene::new(&scene, &pose);
+    let tracer = prepared.for_pose(&scene, &pose);
+    let mut numbers = Numbers(11);
+    for i in 0..40_000 {
+        // Half of them aim at corners and edges, where leaks would be.
+        let origin = Vec3::splat(10.0) + (numbers.point() - 0.5);
+        let target = at(i % n, (i / n) % (2 * n));
+        let next = at(i % n + 1, (i / n + i % 2) % (2 * n));
+        let aim = if i % 4 < 2 { target.lerp(next, numbers.next()) } else { target };
+        let direction = if i % 2 == 0 { numbers.direction() } else { (aim - origin).normalize() };
+        assert!(tracer.closest(origin, direction, f32::INFINITY, &ALL).is_some(), "leak {i}");
+        assert!(tracer.occluded(origin, direction, 10.0, &ALL));
+    }
+}
+
+#[test]
+fn cutouts_ask_and_others_do_not() {
+    let at = |z: f32| [Vec3::new(0.0, 0.0, z), Vec3::new(1.0, 0.0, z), Vec3::new(0.0, 1.0, z)];
+    let mut leaf = mesh(&[at(1.0)]);
+    leaf.material = Some(0);
+    let mut scene =
+        scene(vec![leaf, mesh(&[at(0.0)])], &[(0, Trs::default()), (1, Trs::default())]);
+    scene.materials.push(Material { alpha_mode: AlphaMode::Mask(0.5), ..Default::default() });
+    for moving in [false, true] {
+        if moving {
+            scene.nodes[0] = turning(scene.nodes[0].clone());
+        }
+        let pose = scene.pose_at(0.0);
+        let prepared = RayScene::new(&scene, &pose);
+        let tracer = prepared.for_pose(&scene, &pose);
+        let left_half = |instance: u32, triangle: u32, weights: Vec2| {
+            assert_eq!((instance, triangle), (0, 0));
+            weights.x < 0.5
+        };
+        for (x, t) in [(0.2, 1.0), (0.7, 2.0)] {
+            let origin = Vec3::new(x, 0.1, 2.0);
+            let hit = tracer.closest(origin, -Vec3::Z, 9.0, &left_half).unwrap();
+            assert_eq!(hit.t, t);
+            let blocked = tracer.occluded(origin, -Vec3::Z, 1.5, &left_half);
+            assert_eq!(blocked, t == 1.0);
+        }
+    }
+}
+
+#[test]
+fn empty_and_broken_geometry_is_never_hit() {
+    let broken = [
+        [Vec3::ZERO; 3],
+        [Vec3::ZERO, Vec3::X, 2.0 * Vec3::X],
+        [Vec3::NAN, Vec3::X, Vec3::Y],
+        [Vec3::new(f32::INFINITY, 0.0, 0.0), Vec3::X, Vec3::Y],
+        [Vec3::splat(1e30), Vec3::X, Vec3::Y],
+    ];
+    let zero = parts(DVec3::ZERO, DQuat::IDENTITY, DVec3::ZERO);
+    let whole = [Vec3::ZERO, Vec3::X, Vec3::Y];
+    let unreal = parts(DVec3::NAN, DQuat::IDENTITY, DVec3::ONE);
+    let mut scenes = vec![
+        Scene::default(),
+        scene(vec![mesh(&[])], &[(0, Trs::default())]),
+        scene(vec![mesh(&broken)], &[(0, Trs::default())]),
+        scene(vec![mesh(&[whole])], &[(0, zero), (0, unreal)]),
+        with_sphere(0.0, DVec3::ZERO, 1.0),
+        with_sphere(f32::NAN, DVec3::ZERO, 1.0),
+        with_sphere(1.0, DVec3::NAN, 1.0),
+    ];
+    let mut moving = scene(vec![mesh(&[whole]), mesh(&[])], &[(0, zero), (1, zero), (0, unreal)]);
+    moving.nodes = moving.nodes.into_iter().map(turning).collect();
+    scenes.push(moving);
+    for scene in &scenes {
+        let pose = scene.pose_at(0.0);
+        let prepared = RayScene::new(scene, &pose);
+        let tracer = prepared.for_pose(scene, &pose);
+        let mut numbers = Numbers(12);
+        for _ in 0..200 {
+            let (o, d) = (numbers.point() - 0.5, numbers.direction());
+            assert!(tracer.closest(o, d, f32::INFINITY, &ALL).is_none());
+            assert!(!tracer.occluded(o, d, f32::INFINITY, &ALL));
+        }
+        for bad in [Vec3::NAN, Vec3::INFINITY, Vec3::ZERO] {
+            assert!(tracer.closest(Vec3::ZERO, bad, 1.0, &ALL).is_none());
+            assert!(tracer.occluded(Vec3::ZERO, bad, 1.0, &ALL));
+        }
+    }
+}
+
+#[test]
+fn a_flat_scaled_moving_mesh_is_a_flat_mesh() {
+    let triangles = soup(&mut Numbers(13), 60, 1.0);
+    let flat = parts(DVec3::ZERO, DQuat::IDENTITY, DVec3::new(1.0, 1.0, 0.0));
+    let mut scene = scene(vec![mesh(&triangles)], &[(0, flat)]);
+    scene.nodes[0] = turning(scene.nodes[0].clone());
+    let pose = scene.pose_at(0.0);
+    let prepared = RayScene::new(&scene, &pose);
+    let tracer = prepared.for_pose(&scene, &pose);
+    let all = world_triangles(&scene, &pose);
+    let mut numbers = Numbers(14);
+    for _ in 0..500 {
+        let origin = numbers.point() + Vec3::Z;
+        let expected = brute(&all, origin, -Vec3::Z).is_some();
+        assert_eq!(tracer.closest(origin, -Vec3::Z, 9.0, &ALL).is_some(), expected);
+    }
+}
+
+#[test]
+fn a_deep_tree_is_walked_from_the_heap() {
+    // Nested triangles, each half as large as the one around it: no balance is possible.
+    let nested = |i: i32| {
+        let size = 1.9_f32.powi(-i % 60);
+        [Vec3::ZERO, Vec3::new(size, 0.0, 1e-3), Vec3::new(0.0, size, 1e-3)].map(|p| p * 1e3)
+    };
+    let triangles: Vec<_> = (0..600).map(nested).collect();
+    let scene = scene(vec![mesh(&triangles)], &[(0, Trs::default())]);
+    let pose = scene.pose_at(0.0);
+    let prepared = RayScene::new(&scene, &pose);
+    let tracer = prepared.for_pose(&scene, &pose);
+    let all = world_triangles(&scene, &pose);
+    let mut numbers = Numbers(15);
+    for _ in 0..300 {
+        let p = numbers.point();
+        let origin = Vec3::new(p.x.powi(9) * 400.0, p.y.powi(9) * 400.0, 5.0);
+        let found = tracer.closest(origin, -Vec3::Z, f32::INFINITY, &ALL).map(|hit| hit.t);
+        let expected = brute(&all, origin, -Vec3::Z).map(|hit| hit.0 as f32);
+        assert_eq!(found.is_some(), expected.is_some());
+        assert!(found.is_none_or(|t| (t / expected.unwrap() - 1.0).abs() < 1e-5));
+    }
+}

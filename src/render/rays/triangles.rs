@@ -1,0 +1,114 @@
+//! Triangles, four at a time.
+//!
+//! A line goes through a triangle by Woop, Benthin and Wald 2013 ("Watertight Ray/Triangle
+//! Intersection"): along a shared edge two triangles compute the same number with opposite signs,
+//! so no ray slips between them. *Where* it goes through is then found in double precision from
+//! the plane alone: the distance is right to about 1e-15 of the coordinates, whatever the size of
+//! the triangle or the scene, so a ray that starts an ulp in front of a surface is in front of it.
+
+use glam::{DVec3, Vec2, Vec3, Vec4};
+
+/// A ray as the kernel carries it: exact for distances, rounded for the search.
+#[derive(Clone, Copy, Debug)]
+pub struct Ray {
+    /// Where it starts.
+    pub origin: DVec3,
+    /// Where it goes, any length; distances are in its lengths.
+    pub direction: DVec3,
+}
+
+/// What Woop's test needs of a ray whose largest direction component is `KZ`.
+#[derive(Clone, Copy, Debug)]
+pub struct ShearedRay<const KZ: usize> {
+    origin: [Vec4; 3],
+    shear_x: Vec4,
+    shear_y: Vec4,
+    scale_z: Vec4,
+}
+
+impl<const KZ: usize> ShearedRay<KZ> {
+    const KX: usize = (KZ + 1) % 3;
+    const KY: usize = (KZ + 2) % 3;
+
+    /// `direction[KZ]` must not be 0.
+    #[inline]
+    pub fn new(origin: Vec3, direction: Vec3) -> Self {
+        let d = direction.to_array();
+        let scale = 1.0 / d[KZ];
+        ShearedRay {
+            origin: origin.to_array().map(Vec4::splat),
+            shear_x: Vec4::splat(d[Self::KX] * scale),
+            shear_y: Vec4::splat(d[Self::KY] * scale),
+            scale_z: Vec4::splat(scale),
+        }
+    }
+}
+
+/// Four triangles: corner, axis, lane. Lanes without a triangle are NaN and are never hit.
+#[derive(Clone, Copy, Debug)]
+pub struct Block {
+    corners: [[Vec4; 3]; 3],
+}
+
+impl Block {
+    /// No triangles.
+    pub const EMPTY: Block = Block { corners: [[Vec4::NAN; 3]; 3] };
+
+    /// Puts a triangle into a lane.
+    pub fn set(&mut self, lane: usize, triangle: [Vec3; 3]) {
+        for (corner, point) in self.corners.iter_mut().zip(triangle) {
+            for (axis, coordinate) in corner.iter_mut().zip(point.to_array()) {
+                axis[lane] = coordinate;
+            }
+        }
+    }
+
+    /// The corners in a lane.
+    pub fn get(&self, lane: usize) -> [DVec3; 3] {
+        self.corners.map(|corner| DVec3::from(corner.map(|axis| f64::from(axis[lane]))))
+    }
+
+    /// A bit for each lane whose triangle the line goes through, some of it between 0 and `tmax`.
+    #[inline(always)]
+    pub fn candidates<const KZ: usize>(&self, ray: &ShearedRay<KZ>, tmax: f32) -> u32 {
+        let [a, b, c] = [0, 1, 2].map(|corner| {
+            let corner: &[Vec4; 3] = &self.corners[corner];
+            let z = corner[KZ] - ray.origin[KZ];
+            let kx = ShearedRay::<KZ>::KX;
+            let ky = ShearedRay::<KZ>::KY;
+            let x = (corner[kx] - ray.origin[kx]) - ray.shear_x * z;
+            let y = (corner[ky] - ray.origin[ky]) - ray.shear_y * z;
+            (x, y, z * ray.scale_z)
+        });
+        let u = c.0 * b.1 - c.1 * b.0;
+        let v = a.0 * c.1 - a.1 * c.0;
+        let w = b.0 * a.1 - b.1 * a.0;
+        let zero = Vec4::ZERO;
+        let front = u.cmpge(zero) & v.cmpge(zero) & w.cmpge(zero);
+        let back = u.cmple(zero) & v.cmple(zero) & w.cmple(zero);
+        // The distance lies between those of the corners.
+        let within =
+            a.2.max(b.2).max(c.2).cmpge(zero) & a.2.min(b.2).min(c.2).cmple(Vec4::splat(tmax));
+        ((front | back) & within).bitmask()
+    }
+}
+
+/// Distance along the ray to the triangle's plane, or `None` if it runs along it.
+#[inline]
+pub fn plane_distance(ray: &Ray, [a, b, c]: [DVec3; 3]) -> Option<f64> {
+    let normal = (b - a).cross(c - a);
+    let along = normal.dot(ray.direction);
+    (along != 0.0).then(|| normal.dot(a - ray.origin) / along)
+}
+
+/// Barycentric coordinates of the second and third corner where the ray meets the triangle, inside
+/// `[0, 1]` with a sum of at most 1.
+pub fn barycentric(ray: &Ray, [a, b, c]: [DVec3; 3]) -> Vec2 {
+    let (ab, ac) = (b - a, c - a);
+    let along = ab.cross(ac).dot(ray.direction);
+    let turned = ray.direction.cross(ray.origin - a);
+    let (u, v) = (ac.dot(turned) / along, -ab.dot(turned) / along);
+    let (u, v) = (u.clamp(0.0, 1.0), v.clamp(0.0, 1.0));
+    let over = (u + v).max(1.0);
+    Vec2::new((u / over) as f32, (v / over) as f32)
+}

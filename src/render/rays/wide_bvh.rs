@@ -1,0 +1,290 @@
+//! A four-wide bounding hierarchy: its nodes, and how it is built and walked.
+//!
+//! The binary tree underneath is `obvhs`' (PLOC with parallel reinsertion, deterministic); here it
+//! is collapsed so that one step tests four boxes, and small subtrees become leaves of up to four
+//! primitives, which one step tests together as well. Why `obvhs`' own traversal is not used: its
+//! wide tree has a fixed epsilon of 1e-4 metres, its binary one is slower, neither knows leaves
+//! of four. The box test is Ize's ("Robust BVH Ray Traversal", 2013): it never misses a box that
+//! the exact ray enters, at any scale.
+
+use glam::{Vec3, Vec3A, Vec4};
+use obvhs::aabb::Aabb;
+use obvhs::bvh2::Bvh2;
+use obvhs::bvh2::reinsertion::ReinsertionOptimizer;
+use obvhs::ploc::{PlocBuilder, PlocSearchDistance, SortPrecision};
+
+/// Children of a node, and primitives of a leaf.
+pub const WIDTH: usize = 4;
+/// Marks a child that is a leaf; the other bits are the leaf's number.
+const LEAF: u32 = 1 << 31;
+/// No child, no primitive.
+pub const NONE: u32 = u32::MAX;
+/// Stack entries kept out of the heap: enough for a tree 42 nodes deep.
+const SHALLOW: usize = 128;
+/// `1 + 2 gamma(3)`: what rounding can take from the distance at which a ray leaves a box.
+const FAR_SLACK: f32 = 1.000_000_5;
+
+/// The hierarchy. Leaves are numbers into whatever its owner keeps in their order.
+#[derive(Debug, Default)]
+pub struct WideBvh {
+    nodes: Vec<Node>,
+    /// Entries that a walk may need.
+    stack: usize,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Node {
+    /// Lower and upper planes of the four children, by axis.
+    planes: [[Vec4; 2]; 3],
+    /// Node number, or leaf number with [`LEAF`].
+    children: [u32; WIDTH],
+}
+
+/// What the box test needs of a ray.
+#[derive(Clone, Copy, Debug)]
+pub struct BoxRay {
+    origin: [Vec4; 3],
+    inverse: [Vec4; 3],
+    /// Which of an axis' two planes is met first.
+    near: [usize; 3],
+}
+
+impl BoxRay {
+    /// A ray; the direction need not have unit length.
+    #[inline]
+    pub fn new(origin: Vec3, direction: Vec3) -> BoxRay {
+        // Bounded, so that no product with a finite distance is NaN.
+        let inverse = direction.to_array().map(|d| (1.0 / d).clamp(-1e30, 1e30));
+        BoxRay {
+            origin: origin.to_array().map(Vec4::splat),
+            inverse: inverse.map(Vec4::splat),
+            near: inverse.map(|i| usize::from(i < 0.0)),
+        }
+    }
+}
+
+impl WideBvh {
+    /// Builds over boxes, with leaves of up to `leaf_size <= 4` of them. Returns the box numbers of
+    /// each leaf, in leaf order, padded with [`NONE`]. Every box must be finite.
+    pub fn build(boxes: &[Aabb], leaf_size: u32) -> (WideBvh, Vec<[u32; WIDTH]>) {
+        if boxes.is_empty() {
+            return (WideBvh::default(), Vec::new());
+        }
+        let indices = (0..boxes.len() as u32).collect();
+        let mut binary = PlocBuilder::with_capacity(boxes.len()).build(
+            PlocSearchDistance::Medium,
+            boxes,
+            indices,
+            SortPrecision::U64,
+            3,
+        );
+        ReinsertionOptimizer::default().run(&mut binary, 0.05, None);
+        Collapse::run(&binary, leaf_size)
+    }
+
+    /// Visits the leaves whose boxes the ray enters before `tmax`, near ones first if `ORDERED`.
+    /// `visit` takes a leaf's number and returns the new `tmax`; a negative one ends the walk.
+    #[inline(always)]
+    pub fn walk<const ORDERED: bool>(
+        &self,
+        ray: &BoxRay,
+        tmax: f32,
+        visit: impl FnMut(u32) -> f32,
+    ) {
+        if self.nodes.is_empty() {
+            return;
+        }
+        if self.stack <= SHALLOW {
+            self.walk_on::<ORDERED>(ray, tmax, &mut [(0, 0.0); SHALLOW], visit);
+        } else {
+            self.walk_on::<ORDERED>(ray, tmax, &mut vec![(0, 0.0); self.stack], visit);
+        }
+    }
+
+    #[inline(always)]
+    fn walk_on<const ORDERED: bool>(
+        &self,
+        ray: &BoxRay,
+        mut tmax: f32,
+        stack: &mut [(u32, f32)],
+        mut visit: impl FnMut(u32) -> f32,
+    ) {
+        let mut depth = 0;
+        let mut current = 0;
+        loop {
+            if current & LEAF != 0 {
+                tmax = visit(current & !LEAF);
+                if tmax < 0.0 {
+                    return;
+                }
+            } else {
+                let node = &self.nodes[current as usize];
+                let (near, mut hits) = node.enter(ray, tmax);
+                if hits != 0 {
+                    let first = hits.trailing_zeros() as usize;
+                    hits &= hits - 1;
+                    if hits == 0 {
+                        current = node.children[first % WIDTH];
+                        continue;
+                    }
+                    let distances = near.to_array();
+                    let base = depth;
+                    stack[depth] = (node.children[first % WIDTH], distances[first % WIDTH]);
+                    depth += 1;
+                    while hits != 0 {
+                        let child = hits.trailing_zeros() as usize % WIDTH;
+                        hits &= hits - 1;
+                        let entry = (node.children[child], distances[child]);
+                        let mut at = depth;
+                        while ORDERED && at > base && stack[at - 1].1 < entry.1 {
+                            stack[at] = stack[at - 1];
+                            at -= 1;
+                        }
+                        stack[at] = entry;
+                        depth += 1;
+                    }
+                }
+            }
+            loop {
+                if depth == 0 {
+                    return;
+                }
+                depth -= 1;
+                let (next, distance) = stack[depth];
+                if distance <= tmax {
+                    current = next;
+                    break;
+                }
+            }
+        }
+    }
+}
+
+impl Node {
+    const EMPTY: Node = Node {
+        planes: [[Vec4::splat(f32::MAX), Vec4::splat(f32::MIN)]; 3],
+        children: [NONE; WIDTH],
+    };
+
+    /// Distances at which the ray enters the children, and which it enters at all.
+    #[inline(always)]
+    fn enter(&self, ray: &BoxRay, tmax: f32) -> (Vec4, u32) {
+        let plane = |axis: usize, side: usize| {
+            (self.planes[axis][side & 1] - ray.origin[axis]) * ray.inverse[axis]
+        };
+        let [x, y, z] = ray.near;
+        let near = plane(0, x).max(plane(1, y)).max(plane(2, z).max(Vec4::ZERO));
+        let far = plane(0, x ^ 1).min(plane(1, y ^ 1)).min(plane(2, z ^ 1)) * FAR_SLACK;
+        let hits = near.cmple(far.min(Vec4::splat(tmax))).bitmask();
+        (near, hits)
+    }
+}
+
+/// From the binary tree to the wide one.
+struct Collapse<'a> {
+    binary: &'a Bvh2,
+    /// Primitives below each binary node.
+    counts: Vec<u32>,
+    leaf_size: u32,
+    wide: WideBvh,
+    leaves: Vec<[u32; WIDTH]>,
+}
+
+impl Collapse<'_> {
+    fn run(binary: &Bvh2, leaf_size: u32) -> (WideBvh, Vec<[u32; WIDTH]>) {
+        let counts = count_primitives(binary);
+        let (wide, leaves) = (WideBvh::default(), Vec::new());
+        let mut collapse = Collapse { binary, counts, leaf_size, wide, leaves };
+        // Nodes are numbered as they are reached depth first; each patches its parent.
+        let mut open = vec![(0_usize, None::<(usize, usize)>, 1_usize)];
+        let mut deepest = 0;
+        while let Some((top, parent, level)) = open.pop() {
+            deepest = deepest.max(level);
+            let number = collapse.wide.nodes.len();
+            if let Some((node, slot)) = parent {
+                collapse.wide.nodes[node].children[slot] = number as u32;
+            }
+            collapse.wide.nodes.push(Node::EMPTY);
+            for (slot, child) in collapse.children_of(top).into_iter().enumerate() {
+                let bounds = *binary.nodes[child].aabb();
+                let node = &mut collapse.wide.nodes[number];
+                for axis in 0..3 {
+                    node.planes[axis][0][slot] = bounds.min[axis];
+                    node.planes[axis][1][slot] = bounds.max[axis];
+                }
+                if collapse.counts[child] <= leaf_size {
+                    node.children[slot] = LEAF | collapse.leaves.len() as u32;
+                    let leaf = collapse.primitives_of(child);
+                    collapse.leaves.push(leaf);
+                } else {
+                    open.push((child, Some((number, slot)), level + 1));
+                }
+            }
+        }
+        collapse.wide.stack = (WIDTH - 1) * deepest + 1;
+        (collapse.wide, collapse.leaves)
+    }
+
+    /// Up to four descendants that cover `top`: the largest is opened first.
+    fn children_of(&self, top: usize) -> Vec<usize> {
+        let mut chosen = vec![top];
+        while chosen.len() < WIDTH {
+            let area = |&child: &usize| self.binary.nodes[child].aabb().half_area();
+            let inner = (0..chosen.len()).filter(|&i| self.counts[chosen[i]] > self.leaf_size);
+            let largest = inner.max_by(|&a, &b| area(&chosen[a]).total_cmp(&area(&chosen[b])));
+            let Some(largest) = largest else { break };
+            let left = self.binary.nodes[chosen[largest]].first_index as usize;
+            chosen[largest] = left;
+            chosen.push(left + 1);
+        }
+        chosen
+    }
+
+    fn primitives_of(&self, top: usize) -> [u32; WIDTH] {
+        let mut found = [NONE; WIDTH];
+        let (mut filled, mut open) = (0, vec![top]);
+        while let Some(node) = open.pop() {
+            let node = &self.binary.nodes[node];
+            let first = node.first_index as usize;
+            if node.is_leaf() {
+                for i in first..first + node.prim_count as usize {
+                    found[filled] = self.binary.primitive_indices[i];
+                    filled += 1;
+                }
+            } else {
+                open.extend([first + 1, first]);
+            }
+        }
+        found
+    }
+}
+
+/// Primitives below each node; children need not stand after their parents.
+fn count_primitives(binary: &Bvh2) -> Vec<u32> {
+    let mut order = Vec::with_capacity(binary.nodes.len());
+    let mut open = vec![0_usize];
+    while let Some(node) = open.pop() {
+        order.push(node);
+        if !binary.nodes[node].is_leaf() {
+            let first = binary.nodes[node].first_index as usize;
+            open.extend([first, first + 1]);
+        }
+    }
+    let mut counts = vec![0; binary.nodes.len()];
+    for &node in order.iter().rev() {
+        let data = &binary.nodes[node];
+        let first = data.first_index as usize;
+        counts[node] =
+            if data.is_leaf() { data.prim_count } else { counts[first] + counts[first + 1] };
+    }
+    counts
+}
+
+/// A box around points.
+pub fn bounds_of(points: &[Vec3]) -> Aabb {
+    let mut bounds = Aabb::INVALID;
+    for &point in points {
+        bounds.extend(Vec3A::from(point));
+    }
+    bounds
+}

@@ -1,0 +1,231 @@
+//! From a hit to a shading point: normals, textures, material.
+//!
+//! [`Surfaces`] answers for one frame. It evaluates a [`Material`] (factors times textures times
+//! vertex colour) and the mesh's attributes at a point of a triangle; it does not trace, and it
+//! does not know the emission profile of an instance (`Instance::shaping`), which the light that
+//! the mesh is applies.
+//!
+//! Sides. The geometric normal of a hit is the front's. Reflection is two-sided, so the shading
+//! frame is turned to the side that `wo` is on; emission leaves the front, and the back too if the
+//! material is double-sided. Normals of a file that point against the winding are turned, missing
+//! ones are the triangle's own, and one that a normal map or interpolation bends away from `wo`
+//! is bent back until `wo` is above its horizon.
+
+use super::bsdf::{Bsdf, SurfaceSample};
+use super::rays::Anchor;
+use crate::math::Frame;
+use crate::math::color::Rgb;
+use crate::scene::{AlphaMode, Material, Mesh, Pose, Scene, TextureUse};
+use glam::{Mat3, Vec2, Vec3, Vec4};
+
+/// The smallest cosine between `wo` and the shading normal.
+const LEAST_COSINE: f32 = 1e-3;
+
+/// Looks up what is at a hit, for one pose of a scene.
+#[derive(Clone, Debug)]
+pub struct Surfaces<'a> {
+    scene: &'a Scene,
+    pose: &'a Pose,
+    plain: Material,
+}
+
+/// A point that light arrives at and leaves from.
+#[derive(Clone, Copy, Debug)]
+pub struct Surface {
+    /// World-space position and geometric normal *of the front*.
+    pub anchor: Anchor,
+    /// Whether `wo` is on the front's side.
+    pub front: bool,
+    /// Shading frame, world space; its normal is on `wo`'s side.
+    pub frame: Frame,
+    /// The material here.
+    pub sample: SurfaceSample,
+    /// Luminance that leaves toward `wo`, nits, before the instance's shaping; 0 on a side that
+    /// does not emit.
+    pub emission_nits: Rgb,
+}
+
+impl Surface {
+    /// How this point reflects.
+    pub fn bsdf(&self) -> Bsdf {
+        Bsdf::new(&self.sample, self.frame)
+    }
+}
+
+/// A point of a triangle of an instance.
+#[derive(Clone, Copy)]
+struct At<'a> {
+    mesh: &'a Mesh,
+    corners: [usize; 3],
+    weights: [f32; 3],
+}
+
+impl<'a> Surfaces<'a> {
+    /// The surfaces of a scene as it stands in `pose`.
+    pub fn new(scene: &'a Scene, pose: &'a Pose) -> Surfaces<'a> {
+        Surfaces { scene, pose, plain: Material::default() }
+    }
+
+    /// Which share of light a point of a cut-out stops, in `[0, 1]`: its opacity where it blends,
+    /// 0 or 1 where it masks, 1 where it is opaque. A ray counts a hit if this exceeds a random
+    /// number from `[0, 1)`.
+    pub fn coverage(&self, instance: u32, triangle: u32, barycentric: Vec2) -> f32 {
+        let (at, material) = self.locate(instance, triangle, barycentric);
+        let opacity = || {
+            let texture = self.lookup(&at, &material.base_color_texture);
+            (material.opacity * texture.w * at.color().w).clamp(0.0, 1.0)
+        };
+        match material.alpha_mode {
+            AlphaMode::Opaque => 1.0,
+            AlphaMode::Mask(cutoff) => f32::from(u8::from(opacity() >= cutoff)),
+            AlphaMode::Blend => opacity(),
+        }
+    }
+
+    /// The shading point of a triangle hit, seen from the unit direction `wo`.
+    pub fn at(
+        &self,
+        instance: u32,
+        triangle: u32,
+        barycentric: Vec2,
+        anchor: Anchor,
+        wo: Vec3,
+    ) -> Surface {
+        let (at, material) = self.locate(instance, triangle, barycentric);
+        let front = anchor.normal.dot(wo) >= 0.0;
+        let node = self.scene.instances[instance as usize].node;
+        let to_world = Mat3::from(self.pose.world(node).matrix3);
+        let normal = self.shading_normal(&at, material, to_world, anchor.normal);
+        let normal = toward(if front { normal } else { -normal }, wo);
+        let emits = front || material.double_sided;
+        let emission_nits = if emits && material.emits() {
+            material.emission_nits * self.lookup(&at, &material.emission_texture).truncate()
+        } else {
+            Rgb::ZERO
+        };
+        let frame = Frame::around(normal);
+        Surface { anchor, front, frame, sample: self.evaluate(&at, material), emission_nits }
+    }
+
+    fn locate(&self, instance: u32, triangle: u32, barycentric: Vec2) -> (At<'a>, &Material) {
+        let mesh = &self.scene.meshes[self.scene.instances[instance as usize].mesh as usize];
+        let corners = mesh.triangles[triangle as usize].map(|corner| corner as usize);
+        let [u, v] = barycentric.to_array();
+        let material = mesh.material.map_or(&self.plain, |m| &self.scene.materials[m as usize]);
+        (At { mesh, corners, weights: [1.0 - u - v, u, v] }, material)
+    }
+
+    /// White where there is no texture.
+    #[inline]
+    fn lookup(&self, at: &At, texture: &Option<TextureUse>) -> Vec4 {
+        match texture {
+            Some(used) => {
+                let uv = used.map(at.interpolate(at.uv_set(used)));
+                self.scene.textures[used.texture as usize].lookup(uv)
+            }
+            None => Vec4::ONE,
+        }
+    }
+
+    fn evaluate(&self, at: &At, material: &Material) -> SurfaceSample {
+        let base = self.lookup(at, &material.base_color_texture) * at.color();
+        let rough_metal = self.lookup(at, &material.metallic_roughness_texture);
+        let specular = material.specular * self.lookup(at, &material.specular_texture).w;
+        let tint = self.lookup(at, &material.specular_color_texture).truncate();
+        let reflected = ((material.ior - 1.0) / (material.ior + 1.0)).powi(2);
+        let f0 = (reflected * material.specular_color * tint).min(Rgb::ONE);
+        SurfaceSample {
+            base_color: material.base_color * base.truncate(),
+            metallic: material.metallic * rough_metal.z,
+            roughness: material.roughness * rough_metal.y,
+            dielectric_f0: f0 * specular,
+            dielectric_f90: specular,
+        }
+    }
+
+    /// Unit, world space, on the front's side.
+    fn shading_normal(&self, at: &At, material: &Material, to_world: Mat3, flat: Vec3) -> Vec3 {
+        let mirrored = to_world.determinant() < 0.0;
+        let smooth = if at.mesh.normals.is_empty() {
+            flat
+        } else {
+            let local = at.interpolate(&at.mesh.normals);
+            let across = cofactor(to_world) * local;
+            let normal = if mirrored { -across } else { across }.normalize_or(flat);
+            if normal.dot(flat) < 0.0 { -normal } else { normal }
+        };
+        let Some(used) = &material.normal_texture else { return smooth };
+        let texel = self.lookup(at, &material.normal_texture).truncate() * 2.0 - 1.0;
+        let bent = texel * Vec3::new(material.normal_scale, material.normal_scale, 1.0);
+        let Some((tangent, turn)) = at.tangent(used) else { return smooth };
+        let tangent = to_world * tangent;
+        let Some(tangent) = (tangent - smooth * smooth.dot(tangent)).try_normalize() else {
+            return smooth;
+        };
+        let turn = if mirrored { -turn } else { turn };
+        let bitangent = smooth.cross(tangent) * turn;
+        (tangent * bent.x + bitangent * bent.y + smooth * bent.z).normalize_or(smooth)
+    }
+}
+
+impl At<'_> {
+    fn interpolate<T: Copy + std::ops::Mul<f32, Output = T> + std::ops::Add<Output = T>>(
+        &self,
+        values: &[T],
+    ) -> T
+    where
+        T: Default,
+    {
+        if values.is_empty() {
+            return T::default();
+        }
+        let [a, b, c] = self.corners.map(|corner| values[corner]);
+        a * self.weights[0] + b * self.weights[1] + c * self.weights[2]
+    }
+
+    fn uv_set(&self, used: &TextureUse) -> &[Vec2] {
+        self.mesh.uv_sets.get(used.uv_set as usize).map_or(&[], Vec::as_slice)
+    }
+
+    fn color(&self) -> Vec4 {
+        if self.mesh.colors.is_empty() { Vec4::ONE } else { self.interpolate(&self.mesh.colors) }
+    }
+
+    /// Local tangent, and the sign of the bitangent `normal x tangent`. Derived where the mesh has
+    /// none: along growing u; the bitangent then goes up the picture, against growing v.
+    fn tangent(&self, used: &TextureUse) -> Option<(Vec3, f32)> {
+        if !self.mesh.tangents.is_empty() {
+            let tangent = self.interpolate(&self.mesh.tangents);
+            return Some((tangent.truncate(), 1.0_f32.copysign(tangent.w)));
+        }
+        let uvs = self.uv_set(used);
+        if uvs.is_empty() {
+            return None;
+        }
+        let [a, b, c] = self.corners.map(|corner| self.mesh.positions[corner]);
+        let [ta, tb, tc] = self.corners.map(|corner| used.map(uvs[corner]));
+        let (ab, ac) = (b - a, c - a);
+        let (tb, tc) = (tb - ta, tc - ta);
+        let area = tb.perp_dot(tc);
+        let along_u = (ab * tc.y - ac * tb.y) * 1.0_f32.copysign(area);
+        // With v downwards a texture that is not mirrored winds the other way than its triangle.
+        (area != 0.0).then_some((along_u, -1.0_f32.copysign(area)))
+    }
+}
+
+/// `det(M) M^-T`, which takes normals along; finite for any matrix.
+fn cofactor(m: Mat3) -> Mat3 {
+    Mat3::from_cols(m.y_axis.cross(m.z_axis), m.z_axis.cross(m.x_axis), m.x_axis.cross(m.y_axis))
+}
+
+/// The unit normal, bent just so far that `wo` is above its horizon.
+fn toward(normal: Vec3, wo: Vec3) -> Vec3 {
+    let cosine = normal.dot(wo);
+    if cosine >= LEAST_COSINE {
+        return normal;
+    }
+    (normal + wo * (LEAST_COSINE - cosine)).normalize_or(wo)
+}
+
+#[cfg(test)]
+mod tests;
