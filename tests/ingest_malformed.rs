@@ -38,8 +38,9 @@ fn gltf_verdicts_agree_with_the_khronos_validator() {
         }
         let result = load(&file);
         let Some(verdict) = verdict(&file) else {
-            println!("no verdict: {} {:?}", file.display(), result.map(|s|s.notes));
-            continue };
+            println!("no verdict: {} {:?}", file.display(), result.map(|s| s.notes));
+            continue;
+        };
         judged += 1;
         let name = file.strip_prefix(&folder).unwrap().display().to_string();
         match (result, verdict.codes.is_empty()) {

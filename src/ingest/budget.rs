@@ -21,7 +21,11 @@ impl Budget {
     }
 
     /// Asks for memory before it is allocated. The object names who asks.
-    pub(super) fn take(&mut self, bytes: u64, object: impl FnOnce() -> String) -> Result<(), Fault> {
+    pub(super) fn take(
+        &mut self,
+        bytes: u64,
+        object: impl FnOnce() -> String,
+    ) -> Result<(), Fault> {
         match self.left_bytes.checked_sub(bytes) {
             Some(left) => {
                 self.left_bytes = left;

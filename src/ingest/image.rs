@@ -103,7 +103,8 @@ fn decode_exr(bytes: &[u8], object: &str, budget: &mut Budget) -> Result<Picture
         Fault::new(object, format!("cannot be decoded: {error}"))
             .remedy("open it in an image viewer and save it again as flat RGB OpenEXR")
     };
-    let headers = openexr::MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(damaged)?;
+    let headers =
+        openexr::MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(damaged)?;
     for header in &headers.headers {
         let channels = header.channels.list.len().max(3) as u64;
         let size = (header.layer_size.width(), header.layer_size.height());

@@ -20,6 +20,7 @@ mod gltf;
 mod image;
 mod normals;
 mod notes;
+mod obj;
 mod paths;
 mod uri;
 
@@ -35,6 +36,7 @@ pub fn load(path: &Path) -> Result<Scene, IngestError> {
     let scene = match extension.to_str() {
         Some("gltf") => gltf::load(path, false),
         Some("glb") => gltf::load(path, true),
+        Some("obj") => obj::load(path),
         _ => Err(Fault::new("file", "is in a format that is not read")
             .remedy("convert it to .gltf, .glb or .obj; USD with scripts/usd_to_gltf.py")),
     };
@@ -46,6 +48,7 @@ pub fn load(path: &Path) -> Result<Scene, IngestError> {
 
 /// The bytes of the scene file itself.
 fn read_file(path: &Path) -> Result<Vec<u8>, Fault> {
-    std::fs::read(path)
-        .map_err(|error| Fault::new("file", format!("cannot be read: {error}")).remedy("check the path"))
+    std::fs::read(path).map_err(|error| {
+        Fault::new("file", format!("cannot be read: {error}")).remedy("check the path")
+    })
 }

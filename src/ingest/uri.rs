@@ -41,7 +41,8 @@ impl Folder {
         if has_scheme(uri) {
             return Err(refuse("is absolute; only relative and data: URIs are read"));
         }
-        let decoded = percent_decode(uri).ok_or_else(|| refuse("is not percent-encoded UTF-8"))?;
+        let decoded = percent_decode(uri).and_then(|bytes| String::from_utf8(bytes).ok());
+        let decoded = decoded.ok_or_else(|| refuse("is not percent-encoded UTF-8"))?;
         self.resolve(&decoded, object)
     }
 
@@ -94,7 +95,7 @@ fn has_scheme(uri: &str) -> bool {
         && scheme.chars().all(|c| c.is_ascii_alphanumeric() || "+-.".contains(c))
 }
 
-fn percent_decode(text: &str) -> Option<String> {
+fn percent_decode(text: &str) -> Option<Vec<u8>> {
     let mut bytes = Vec::with_capacity(text.len());
     let mut rest = text.as_bytes();
     while let [first, tail @ ..] = rest {
@@ -108,17 +109,22 @@ fn percent_decode(text: &str) -> Option<String> {
         bytes.push((digit(*high)? * 16 + digit(*low)?) as u8);
         rest = tail;
     }
-    String::from_utf8(bytes).ok()
+    Some(bytes)
 }
 
 /// Decodes what follows `data:`.
 fn decode_data_uri(rest: &str) -> Result<Vec<u8>, &'static str> {
     let (kind, data) = rest.split_once(',').ok_or("the data: URI has no comma")?;
-    let is_base64 = kind.rsplit(';').next().is_some_and(|e| e.eq_ignore_ascii_case("base64"));
-    if !is_base64 {
-        return Err("the data: URI is not in base64");
+    let parameters = kind.split(';').skip(1);
+    if parameters.clone().any(str::is_empty) {
+        return Err("the data: URI has an empty parameter");
     }
-    decode_base64(data.as_bytes()).ok_or("the data: URI is not valid base64")
+    match parameters.last() {
+        Some(encoding) if encoding.eq_ignore_ascii_case("base64") => {
+            decode_base64(data.as_bytes()).ok_or("the data: URI is not valid base64")
+        }
+        _ => percent_decode(data).ok_or("the data: URI is not percent-encoded"),
+    }
 }
 
 /// RFC 4648, with or without padding.
@@ -181,11 +187,31 @@ mod tests {
             assert_eq!(folder.read_uri(uri, "buffer 0").unwrap(), b"inside");
         }
         assert_eq!(folder.read_uri("data:;base64,AAE", "buffer 0").unwrap(), [0, 1]);
+        assert_eq!(folder.read_uri("data:text/plain,a%00", "buffer 0").unwrap(), b"a\0");
         let absolute = outer.path().join("secret").display().to_string();
         for uri in [
-            "../secret", "..%2Fsecret", "%2e%2e/secret", "a/../../secret", "..\\secret", "link",
-            "", ".", "sub dir", "absent", "%zz", "%ff", "a%00b", "file:///etc/passwd", &absolute,
-            "http://example.com/a.bin", "//host/a", "C:\\a.bin", "data:,abc", "data:;base64,?",
+            "../secret",
+            "..%2Fsecret",
+            "%2e%2e/secret",
+            "a/../../secret",
+            "..\\secret",
+            "link",
+            "",
+            ".",
+            "sub dir",
+            "absent",
+            "%zz",
+            "%ff",
+            "a%00b",
+            "file:///etc/passwd",
+            &absolute,
+            "http://example.com/a.bin",
+            "//host/a",
+            "C:\\a.bin",
+            "data:;base64",
+            "data:;base64,?",
+            "data:;;base64,AAE",
+            "data:,%z",
         ] {
             assert!(folder.read_uri(uri, "buffer 0").is_err(), "{uri}");
         }

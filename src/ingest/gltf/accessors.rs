@@ -129,8 +129,14 @@ impl Shape {
         if self.columns == 1 { tight } else { tight.next_multiple_of(4) }
     }
 
-    fn bytes(self, component: Component) -> usize {
+    /// Bytes from one element to the next, if they are packed.
+    fn step(self, component: Component) -> usize {
         self.columns * self.column_bytes(component)
+    }
+
+    /// Bytes that belong to an element: without the padding after its last column.
+    fn bytes(self, component: Component) -> usize {
+        (self.columns - 1) * self.column_bytes(component) + self.rows * component.size()
     }
 }
 
@@ -173,11 +179,18 @@ impl<'a> Accessor<'a> {
         let count = u32::try_from(row.count)
             .ok()
             .filter(|&count| count > 0)
-            .ok_or_else(|| fault(format!("has {} elements", row.count)))? as usize;
+            .ok_or_else(|| fault(format!("has {} elements", row.count)))?
+            as usize;
         let base = match row.buffer_view {
-            Some(view) => {
-                Some(Strided::open(document, buffers, row, view, count, (component, shape), object)?)
-            }
+            Some(view) => Some(Strided::open(
+                document,
+                buffers,
+                row,
+                view,
+                count,
+                (component, shape),
+                object,
+            )?),
             None if row.byte_offset.is_some() => {
                 return Err(fault("has an offset into no buffer view".into()));
             }
@@ -186,7 +199,9 @@ impl<'a> Accessor<'a> {
         let sparse = row
             .sparse
             .as_ref()
-            .map(|sparse| Overrides::open(document, buffers, sparse, count, (component, shape), object))
+            .map(|sparse| {
+                Overrides::open(document, buffers, sparse, count, (component, shape), object)
+            })
             .transpose()?;
         Ok(Accessor { component, shape, count, normalized: row.normalized, base, sparse })
     }
@@ -198,7 +213,7 @@ impl<'a> Accessor<'a> {
 
     /// Whether the elements are interleaved with others, as only vertex attributes may be.
     pub(super) fn is_interleaved(&self) -> bool {
-        let tight = self.shape.bytes(self.component);
+        let tight = self.shape.step(self.component);
         self.base.as_ref().is_some_and(|base| base.stride != tight)
     }
 
@@ -208,7 +223,7 @@ impl<'a> Accessor<'a> {
         if let Some(sparse) = &self.sparse
             && let Ok(at) = sparse.indices.binary_search(&(i as u32))
         {
-            return &sparse.values[at * size..][..size];
+            return &sparse.values[at * self.shape.step(self.component)..][..size];
         }
         self.base.as_ref().map_or(&[], |base| &base.bytes[i * base.stride..][..size])
     }
@@ -275,7 +290,7 @@ impl<'a> Strided<'a> {
         let size = shape.bytes(component);
         let stride = match view_row.byte_stride {
             Some(stride) => usize::try_from(stride).unwrap_or(usize::MAX),
-            None => size,
+            None => shape.step(component),
         };
         if stride < size {
             return Err(fault(format!("its elements of {size} bytes overlap: stride {stride}")));
@@ -291,9 +306,9 @@ impl<'a> Strided<'a> {
         }
         let extent = stride.checked_mul(count - 1).and_then(|bytes| bytes.checked_add(size));
         let start = usize::try_from(offset).ok();
-        let inside = start.zip(extent).and_then(|(start, extent)| {
-            bytes.get(start..start.checked_add(extent)?)
-        });
+        let inside = start
+            .zip(extent)
+            .and_then(|(start, extent)| bytes.get(start..start.checked_add(extent)?));
         let bytes = inside.ok_or_else(|| {
             let room = view_row.byte_length;
             fault(format!("its {count} elements do not fit the {room} bytes of buffer view {view}"))
@@ -332,11 +347,12 @@ impl<'a> Overrides<'a> {
         let coded = packed(sparse.indices.buffer_view, sparse.indices.byte_offset, kind.size())?;
         let indices: Vec<u32> =
             coded.chunks_exact(kind.size()).map(|bytes| kind.raw(bytes) as u32).collect();
-        if !indices.is_sorted_by(|a, b| a < b) || indices.last().is_some_and(|&i| i as usize >= count)
+        if !indices.is_sorted_by(|a, b| a < b)
+            || indices.last().is_some_and(|&i| i as usize >= count)
         {
             return Err(fault("indices do not ascend or are out of range"));
         }
-        let size = shape.bytes(component);
+        let size = shape.step(component);
         let values = packed(sparse.values.buffer_view, sparse.values.byte_offset, size)?;
         Ok(Overrides { indices, values })
     }

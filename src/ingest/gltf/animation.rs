@@ -18,7 +18,8 @@ pub(super) fn compile(source: &Source, output: &mut Output) -> Result<Vec<Vec<Ch
         for row in &animation.channels {
             let sampler = &animation.samplers[row.sampler as usize];
             let Some((node, path)) = target(&row.target) else {
-                output.notes.add(object.clone(), unread(&row.target));
+                let (what, text) = unread(&row.target);
+                output.notes.add(format!("{object}, {what}"), text);
                 continue;
             };
             let values = &source.accessors[sampler.output as usize];
@@ -53,12 +54,23 @@ fn target(target: &Target) -> Option<(u32, &'static str)> {
     }
 }
 
-fn unread(target: &Target) -> String {
-    match (&target.extensions.pointer, target.path.as_str()) {
-        (Some(pointer), _) => format!("animation of {} is not read", pointer.pointer),
-        (None, "weights") => "animation of morph weights is not read".into(),
-        (None, path) => format!("animation of {path:?} is not read"),
-    }
+/// What an animation that is not read is of, and what is said of its kind.
+fn unread(target: &Target) -> (&str, &'static str) {
+    let Some(pointer) = &target.extensions.pointer else {
+        return (&target.path, "animation of shapes is not read");
+    };
+    let pointer = pointer.pointer.as_str();
+    let text = match pointer.split('/').nth(1) {
+        Some("materials") => "animation of materials is not read",
+        Some("cameras") => "animation of lenses is not read",
+        Some("extensions") if pointer.contains("KHR_lights_punctual") => {
+            "animation of light is not read; the light is constant"
+        }
+        Some("meshes") => "animation of shapes is not read",
+        _ if pointer.ends_with("/weights") => "animation of shapes is not read",
+        _ => "animation of this is not read",
+    };
+    (pointer, text)
 }
 
 fn channel(

@@ -6,6 +6,8 @@ use crate::ingest::error::Fault;
 use crate::ingest::uri::Folder;
 use std::borrow::Cow;
 
+const GIT_LFS_POINTER: &[u8] = b"version https://git-lfs.github.com/spec/";
+
 /// The bytes of every buffer of the document, at least as many as it declares. A buffer without a
 /// source (the fallback of a compression, say) is empty.
 pub(super) struct Buffers<'a> {
@@ -29,11 +31,22 @@ impl<'a> Buffers<'a> {
                 None if i == 0 && file.binary().is_some() => {
                     Cow::Borrowed(file.binary().unwrap_or_default())
                 }
+                None if i == 0 && file.is_glb() => {
+                    return Err(Fault::new(
+                        object,
+                        "should be the file's binary chunk, which is absent",
+                    )
+                    .remedy("the file is damaged; fetch or export it again"));
+                }
                 None => {
                     buffers.push(Cow::Borrowed(&[][..]));
                     continue;
                 }
             };
+            if bytes.starts_with(GIT_LFS_POINTER) {
+                return Err(Fault::new(object, "is a Git LFS pointer, not the data")
+                    .remedy("run git lfs pull"));
+            }
             if (bytes.len() as u64) < buffer.byte_length {
                 let (declared, real) = (buffer.byte_length, bytes.len());
                 let problem = format!("declares {declared} bytes, but there are {real}");

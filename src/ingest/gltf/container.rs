@@ -38,6 +38,10 @@ impl Container {
         Some(&self.bytes[self.binary.clone()?])
     }
 
+    pub(super) fn is_glb(&self) -> bool {
+        self.bytes.starts_with(MAGIC)
+    }
+
     pub(super) fn size(&self) -> usize {
         self.bytes.len()
     }

@@ -146,12 +146,15 @@ impl Meshes {
             mesh.tangents = vertices.read(accessor, 1.0, unit_tangent);
             // A mesh with tangents of no length has none that mean anything.
             if mesh.tangents.iter().any(|tangent| !tangent.is_finite()) {
-                output.notes.add(object, "has tangents without a direction; derived from its texture set");
+                output
+                    .notes
+                    .add(object, "has tangents without a direction; derived from its texture set");
                 mesh.tangents.clear();
             }
         }
         if let Some(accessor) = attribute("COLOR_0") {
-            mesh.colors = vertices.read(accessor, 1.0, |c| Vec4::from(c).clamp(Vec4::ZERO, Vec4::ONE));
+            mesh.colors =
+                vertices.read(accessor, 1.0, |c| Vec4::from(c).clamp(Vec4::ZERO, Vec4::ONE));
         }
         for set in sets {
             match attribute(&format!("TEXCOORD_{set}")).filter(|_| set < MOST_UV_SETS) {

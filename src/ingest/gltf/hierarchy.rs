@@ -137,9 +137,8 @@ impl Walk<'_> {
         let Some(instances) = &row.extensions.instancing else {
             return self.put_mesh(output, mesh, node, &placed);
         };
-        for (i, local) in instancing::transforms(self.source, output, instances, &object)?
-            .into_iter()
-            .enumerate()
+        for (i, local) in
+            instancing::transforms(self.source, output, instances, &object)?.into_iter().enumerate()
         {
             let path = format!("{}[{i}]", output.scene.nodes[node as usize].path);
             let child = self.push(output, Node::fixed(path, Some(node), local))?;

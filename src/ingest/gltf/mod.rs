@@ -49,12 +49,8 @@ pub(super) fn load(path: &Path, must_be_glb: bool) -> Result<Scene, Fault> {
     let buffers = Buffers::read(&document, &file, &folder)?;
     let accessors = Accessor::open_all(&document, &buffers)?;
     validate::contents(&document, &accessors)?;
-    let source = Source {
-        document: &document,
-        accessors: &accessors,
-        buffers: &buffers,
-        folder: &folder,
-    };
+    let source =
+        Source { document: &document, accessors: &accessors, buffers: &buffers, folder: &folder };
     let budget = Budget::for_file(buffers.size().saturating_add(file.size() as u64));
     let mut output = Output { scene: Scene::default(), notes: Notes::default(), budget };
     output.scene.timeline = timeline(&document)?;

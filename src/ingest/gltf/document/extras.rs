@@ -72,7 +72,10 @@ impl UsdCamera {
 }
 
 impl UsdLux {
-    pub(in crate::ingest::gltf) fn of(extras: &Value, object: &str) -> Result<Option<UsdLux>, Fault> {
+    pub(in crate::ingest::gltf) fn of(
+        extras: &Value,
+        object: &str,
+    ) -> Result<Option<UsdLux>, Fault> {
         member(extras, "usdLux", object)
     }
 }

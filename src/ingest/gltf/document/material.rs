@@ -1,7 +1,7 @@
 //! Materials, textures and images, as the file says them.
 
-use super::real::{Real, default_ior, half, one, opaque_white, white};
 use super::Unread;
+use super::real::{Real, default_ior, half, one, opaque_white, white};
 use serde::Deserialize;
 
 #[derive(Deserialize)]
@@ -183,7 +183,9 @@ impl Material {
         ]
         .into_iter()
         .chain(specular.into_iter().flat_map(|s| [&s.specular_texture, &s.specular_color_texture]))
-        .chain(glossy.into_iter().flat_map(|g| [&g.diffuse_texture, &g.specular_glossiness_texture]))
+        .chain(
+            glossy.into_iter().flat_map(|g| [&g.diffuse_texture, &g.specular_glossiness_texture]),
+        )
         .flatten()
     }
 }

@@ -5,8 +5,9 @@ use crate::ingest::gltf::document::{Document, Material, Real, label};
 
 pub(super) fn check(document: &Document) -> Result<(), Fault> {
     for (i, material) in document.materials.iter().enumerate() {
-        check_material(material)
-            .map_err(|problem| Fault::new(label("material", i, material.name.as_deref()), problem))?;
+        check_material(material).map_err(|problem| {
+            Fault::new(label("material", i, material.name.as_deref()), problem)
+        })?;
     }
     Ok(())
 }

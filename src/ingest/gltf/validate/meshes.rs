@@ -79,7 +79,8 @@ fn attribute_allows(semantic: &str, accessor: &Accessor, quantized: bool) -> boo
     let small = !float && component != Component::U32;
     let unsigned_norm = small && component.is_unsigned() && normalized;
     let signed_norm = small && !component.is_unsigned() && normalized;
-    let set = |prefix: &str| semantic.strip_prefix(prefix).is_some_and(|n| n.parse::<u32>().is_ok());
+    let set =
+        |prefix: &str| semantic.strip_prefix(prefix).is_some_and(|n| n.parse::<u32>().is_ok());
     match semantic {
         "POSITION" => shape == Shape::VEC3 && (float || quantized && small),
         "NORMAL" => shape == Shape::VEC3 && (float || quantized && signed_norm),

@@ -66,7 +66,9 @@ fn check_camera(camera: &Camera) -> Result<(), String> {
                 return Err(format!("its field of view, {yfov} radians, is not in (0, pi)"));
             }
             match lens.aspect_ratio {
-                Some(aspect) if aspect.f64() <= 0.0 => Err("its aspect ratio is not positive".into()),
+                Some(aspect) if aspect.f64() <= 0.0 => {
+                    Err("its aspect ratio is not positive".into())
+                }
                 _ => Ok(()),
             }
         }

@@ -52,6 +52,9 @@ fn check_storage(document: &Document) -> Result<(), Fault> {
         if view.byte_stride.is_some() && view.target == Some(ELEMENT_ARRAY_BUFFER) {
             return Err(Fault::new(object(), "holds indices and has a stride"));
         }
+        if view.byte_stride.is_some_and(|stride| stride > view.byte_length) {
+            return Err(Fault::new(object(), "its stride is longer than itself"));
+        }
     }
     for (i, accessor) in document.accessors.iter().enumerate() {
         let sparse = accessor.sparse.as_ref();
@@ -122,11 +125,14 @@ fn check_looks(document: &Document) -> Result<(), Fault> {
     for (i, material) in document.materials.iter().enumerate() {
         for usage in material.texture_uses() {
             textures.holds(usage.index, || label("material", i, material.name.as_deref()))?;
+            // A texture that no material uses may lead nowhere, as real exporters leave them.
+            let texture = &document.textures[usage.index as usize];
+            let object = || label("texture", usage.index as usize, texture.name.as_deref());
+            texture.source.map_or(Ok(()), |source| images.holds(source, object))?;
         }
     }
     for (i, texture) in document.textures.iter().enumerate() {
         let object = || label("texture", i, texture.name.as_deref());
-        texture.source.map_or(Ok(()), |source| images.holds(source, object))?;
         texture.sampler.map_or(Ok(()), |sampler| samplers.holds(sampler, object))?;
     }
     Ok(())
