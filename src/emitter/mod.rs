@@ -18,6 +18,6 @@ mod texels;
 mod triangle;
 
 pub use infinite::{InfiniteLight, InfiniteSample, infinite_lights};
-pub use posed::{EmitterHit, LightOverflow, LightSample, PosedEmitters};
+pub use posed::{EmitterHit, LightOverflow, LightSample, MeshPlace, PosedEmitters};
 pub use set::{EmitterRef, Emitters, LightEntry, LightSource};
 pub use sphere::WorldSphere;

@@ -40,6 +40,19 @@ pub struct LightSample {
     pub radiance: Rgb,
     /// Density over solid angle, 1/sr; `None` for a point or a spot, which no ray can hit.
     pub pdf: Option<f32>,
+    /// Where on a mesh light: its coverage there, which a material may lower, is not in `radiance`.
+    pub on_mesh: Option<MeshPlace>,
+}
+
+/// A place on an instance of a mesh.
+#[derive(Clone, Copy, Debug)]
+pub struct MeshPlace {
+    /// Index into [`Scene::instances`].
+    pub instance: u32,
+    /// Index into the mesh's triangles.
+    pub triangle: u32,
+    /// Weights of the second and third corner.
+    pub barycentric: Vec2,
 }
 
 /// A place on an emitter that a ray has hit.
@@ -133,23 +146,21 @@ impl<'a> PosedEmitters<'a> {
         match self.emitters.light_of(emitter).source {
             LightSource::Instance(row) => {
                 let instance = &self.scene.instances[row as usize];
-                let triangle = self.triangle(instance, self.emitters.get(emitter).triangle);
+                let number = self.emitters.get(emitter).triangle;
+                let triangle = self.triangle(instance, number);
                 let found = triangle.sample(receiver, u)?;
-                let to_light = triangle.at(found.barycentric) - receiver;
+                let barycentric = found.barycentric;
+                let to_light = triangle.at(barycentric) - receiver;
                 let distance = to_light.length();
                 let direction = to_light / distance;
-                let radiance = self.triangle_radiance(
-                    emitter,
-                    instance,
-                    &triangle,
-                    found.barycentric,
-                    direction,
-                );
+                let radiance =
+                    self.triangle_radiance(emitter, instance, &triangle, barycentric, direction);
                 (radiance != Rgb::ZERO).then_some(LightSample {
                     direction,
                     distance,
                     radiance,
                     pdf: Some(found.pdf),
+                    on_mesh: Some(MeshPlace { instance: row, triangle: number, barycentric }),
                 })
             }
             LightSource::Light(row) => {
@@ -176,6 +187,7 @@ impl<'a> PosedEmitters<'a> {
                     distance: found.distance,
                     radiance: *radiance_nits * shaped(shaping, found.direction),
                     pdf: Some(found.pdf),
+                    on_mesh: None,
                 }
             }
             LightKind::Distant { .. } | LightKind::Dome { .. } => return None,
@@ -202,7 +214,7 @@ impl<'a> PosedEmitters<'a> {
             shaping.map_or(Rgb::ONE, |s| s.factor((-direction).dot(self.aim(light.node))));
         let window = light.range_m.map_or(1.0, |range| (1.0 - (distance / range).powi(4)).max(0.0));
         let radiance = intensity_cd * profile * (window / d2);
-        Some(LightSample { direction, distance, radiance, pdf: None })
+        Some(LightSample { direction, distance, radiance, pdf: None, on_mesh: None })
     }
 
     /// Radiance that a ray sees where it has hit an emitter, nits. `direction` is the ray's, unit.

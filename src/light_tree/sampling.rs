@@ -35,7 +35,6 @@ pub struct FrameTree<'a> {
     pairs: &'a [Pair],
     leaves: &'a [u32],
     trees: &'a [TreeRow],
-    /// The frame's tree and the trees that its leaves stand for, from the top down.
     root: Option<u32>,
     /// The leaf of the frame's tree that stands for the tree of what stands still.
     below: Option<(u32, u32)>,
@@ -226,15 +225,18 @@ impl FrameTree<'_> {
         }
     }
 
-    /// The importance of everything at a receiver; 0 if nothing shines.
-    pub fn total_importance(&self, receiver: &Receiver) -> f64 {
-        let root = self.root.and_then(|row| self.trees.get(row as usize));
-        root.map_or(0.0, |tree| tree.root.importance(receiver))
+    /// The node of everything; `None` if nothing shines.
+    pub fn root(&self) -> Option<&Node> {
+        self.root.and_then(|row| self.trees.get(row as usize)).map(|tree| &tree.root)
     }
 
-    /// Calls `visit` with every emitter and the importance of its own leaf: what a perfect
-    /// traversal of this importance would weigh.
-    pub fn for_each_emitter(&self, receiver: &Receiver, mut visit: impl FnMut(u32, f64)) {
+    /// The importance of everything at a receiver; 0 if nothing shines.
+    pub fn total_importance(&self, receiver: &Receiver) -> f64 {
+        self.root().map_or(0.0, |root| root.importance(receiver))
+    }
+
+    /// Calls `visit` with every emitter and its leaf's node: what a perfect traversal would weigh.
+    pub fn for_each_leaf(&self, mut visit: impl FnMut(u32, &Node)) {
         let mut next = self.root;
         while let Some((row, tree)) =
             next.and_then(|row| self.trees.get(row as usize).map(|tree| (row, tree)))
@@ -243,9 +245,7 @@ impl FrameTree<'_> {
             let mut see = |node: &Node| {
                 let Link::Leaf(leaf) = node.link() else { return };
                 match self.leaves.get(leaf as usize).copied().map(LeafContent::decode) {
-                    Some(LeafContent::Emitter(emitter)) => {
-                        visit(emitter, node.importance(receiver));
-                    }
+                    Some(LeafContent::Emitter(emitter)) => visit(emitter, node),
                     Some(LeafContent::Tree(below)) if below < row => next = Some(below),
                     _ => {}
                 }

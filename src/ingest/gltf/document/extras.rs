@@ -1,0 +1,97 @@
+//! What `extras` carry for Candelabra; see `carriers.md`.
+
+use super::{Real, typed};
+use crate::ingest::error::Fault;
+use serde::Deserialize;
+use serde::de::DeserializeOwned;
+use serde_json::Value;
+
+/// `asset.extras.usd`: the clock of the stage.
+#[derive(Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub(in crate::ingest::gltf) struct AssetUsd {
+    pub time_codes_per_second: Option<Real>,
+    pub start_time_code: Option<Real>,
+    pub end_time_code: Option<Real>,
+}
+
+/// `extras.usdCamera`: the lens.
+#[derive(Deserialize)]
+pub(in crate::ingest::gltf) struct UsdCamera {
+    #[serde(default, rename = "fStop")]
+    pub f_stop: Real,
+    #[serde(default, rename = "focalLength_m")]
+    pub focal_length_m: Real,
+    #[serde(default, rename = "focusDistance_m")]
+    pub focus_distance_m: Real,
+    #[serde(default, rename = "filmOffset")]
+    pub film_offset: [Real; 2],
+}
+
+/// `extras.usdLux`: the light at a node.
+#[derive(Deserialize)]
+pub(in crate::ingest::gltf) struct UsdLux {
+    #[serde(rename = "type")]
+    pub kind: String,
+    pub radius: Option<Real>,
+    pub shaping: Option<UsdShaping>,
+    pub angle: Option<Real>,
+    pub radiance: Option<[Real; 3]>,
+    pub texture: Option<String>,
+    #[serde(default)]
+    pub force: bool,
+    pub values: Option<serde::de::IgnoredAny>,
+}
+
+/// `extras.usdLux.shaping`: UsdLux ShapingAPI, degrees.
+#[derive(Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub(in crate::ingest::gltf) struct UsdShaping {
+    pub cone_angle: Option<Real>,
+    #[serde(default)]
+    pub cone_softness: Real,
+    #[serde(default)]
+    pub focus: Real,
+    #[serde(default)]
+    pub focus_tint: [Real; 3],
+}
+
+impl AssetUsd {
+    pub(in crate::ingest::gltf) fn of(extras: &Value) -> Result<Option<AssetUsd>, Fault> {
+        member(extras, "usd", "asset")
+    }
+}
+
+impl UsdCamera {
+    pub(in crate::ingest::gltf) fn of(
+        extras: &Value,
+        object: &str,
+    ) -> Result<Option<UsdCamera>, Fault> {
+        member(extras, "usdCamera", object)
+    }
+}
+
+impl UsdLux {
+    pub(in crate::ingest::gltf) fn of(
+        extras: &Value,
+        object: &str,
+    ) -> Result<Option<UsdLux>, Fault> {
+        member(extras, "usdLux", object)
+    }
+}
+
+/// `extras.usdPath`, if it is an absolute path; anything else is some other program's.
+pub(in crate::ingest::gltf) fn usd_path(extras: &Value) -> Option<&str> {
+    extras.get("usdPath")?.as_str().filter(|path| path.starts_with('/') && path.len() > 1)
+}
+
+fn member<T: DeserializeOwned>(
+    extras: &Value,
+    key: &str,
+    object: &str,
+) -> Result<Option<T>, Fault> {
+    match extras.get(key) {
+        Some(value) => typed(value.clone(), &format!("{object}, extras.{key}")).map(Some),
+        None => Ok(None),
+    }
+}

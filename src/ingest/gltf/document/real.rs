@@ -1,0 +1,58 @@
+//! Numbers.
+
+use serde::Deserialize;
+
+/// A number of the file that `f32` can hold; anything larger is refused while parsing.
+#[derive(Clone, Copy, Debug, Default, Deserialize, PartialEq, PartialOrd)]
+#[serde(try_from = "f64")]
+pub(in crate::ingest::gltf) struct Real(f64);
+
+impl TryFrom<f64> for Real {
+    type Error = String;
+
+    fn try_from(value: f64) -> Result<Real, String> {
+        match (value as f32).is_finite() {
+            true => Ok(Real(value)),
+            false => Err(format!("{value:e} is too large for a 32-bit number")),
+        }
+    }
+}
+
+impl Real {
+    pub(in crate::ingest::gltf) fn f64(self) -> f64 {
+        self.0
+    }
+
+    pub(in crate::ingest::gltf) fn f32(self) -> f32 {
+        self.0 as f32
+    }
+}
+
+/// Several numbers in single precision.
+pub(in crate::ingest::gltf) fn reals<const N: usize>(values: [Real; N]) -> [f32; N] {
+    values.map(Real::f32)
+}
+
+pub(super) fn one() -> Real {
+    Real(1.0)
+}
+
+pub(super) fn half() -> Real {
+    Real(0.5)
+}
+
+pub(super) fn eighth_turn() -> Real {
+    Real(std::f64::consts::FRAC_PI_4)
+}
+
+pub(super) fn default_ior() -> Real {
+    Real(1.5)
+}
+
+pub(super) fn white() -> [Real; 3] {
+    [Real(1.0); 3]
+}
+
+pub(super) fn opaque_white() -> [Real; 4] {
+    [Real(1.0); 4]
+}

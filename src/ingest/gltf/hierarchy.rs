@@ -1,0 +1,230 @@
+//! Nodes, parents first, and what stands at them.
+
+use super::document::{Node as Row, UsdLux, label, usd_path};
+use super::geometry::Meshes;
+use super::lights::{self, Placed};
+use super::{Output, Source, animation, cameras, instancing};
+use crate::ingest::error::Fault;
+use crate::ingest::paths::{PrimPaths, component};
+use crate::scene::{Channel, Instance, Node, Shaping, Trs};
+use glam::{DAffine3, DMat4, DQuat, DVec3};
+
+/// How far a scale may be from uniform for a sphere to stay a sphere.
+const UNIFORM_TOLERANCE: f64 = 1e-4;
+
+/// A node of the file that is to be compiled.
+struct Open {
+    row: u32,
+    parent: Option<u32>,
+    visible: bool,
+}
+
+/// What grows while the hierarchy is walked.
+struct Walk<'a> {
+    source: &'a Source<'a>,
+    channels: Vec<Vec<Channel>>,
+    meshes: Meshes,
+    paths: PrimPaths,
+    /// For each node of the scene, whether neither it nor an ancestor ever scales unevenly.
+    uniform: Vec<bool>,
+}
+
+/// Compiles the nodes of the file's scene and everything at them.
+pub(super) fn compile(source: &Source, output: &mut Output) -> Result<(), Fault> {
+    let mut walk = Walk {
+        source,
+        channels: animation::compile(source, output)?,
+        meshes: Meshes::new(source),
+        paths: PrimPaths::default(),
+        uniform: Vec::new(),
+    };
+    // A stack, so that no depth of the hierarchy is a depth of calls.
+    let roots = roots(source, output);
+    let open = |row: u32, parent, visible| Open { row, parent, visible };
+    let mut stack: Vec<Open> = roots.into_iter().rev().map(|row| open(row, None, true)).collect();
+    while let Some(Open { row: number, parent, visible }) = stack.pop() {
+        let row = &source.document.nodes[number as usize];
+        let visible = visible && row.extensions.visibility.as_ref().is_none_or(|v| v.visible);
+        let node = walk.place(output, number, row, parent)?;
+        if visible {
+            walk.furnish(output, number, row, node)?;
+        } else if row.mesh.is_some() || row.extensions.light.is_some() {
+            let object = label("node", number as usize, row.name.as_deref());
+            output.notes.add(object, "is hidden (KHR_node_visibility); left out");
+        }
+        stack.extend(row.children.iter().rev().map(|&child| open(child, Some(node), visible)));
+    }
+    Ok(())
+}
+
+/// The roots of the default scene, else of the first, else all.
+fn roots(source: &Source, output: &mut Output) -> Vec<u32> {
+    let document = source.document;
+    match document.scenes.get(document.scene.unwrap_or(0) as usize) {
+        Some(scene) => {
+            if document.scenes.len() > 1 {
+                let object = format!("scene {}", document.scene.unwrap_or(0));
+                output.notes.add(object, "only this one of the file's scenes is read");
+            }
+            scene.nodes.clone()
+        }
+        None => {
+            let mut is_root = vec![true; document.nodes.len()];
+            for &child in document.nodes.iter().flat_map(|node| &node.children) {
+                is_root[child as usize] = false;
+            }
+            (0..is_root.len() as u32).filter(|&i| is_root[i as usize]).collect()
+        }
+    }
+}
+
+impl Walk<'_> {
+    /// Adds a node to the scene.
+    fn place(
+        &mut self,
+        output: &mut Output,
+        number: u32,
+        row: &Row,
+        parent: Option<u32>,
+    ) -> Result<u32, Fault> {
+        let path = match usd_path(&row.extras) {
+            Some(path) => path.to_string(),
+            None => {
+                let above = parent.map_or("", |parent| &output.scene.nodes[parent as usize].path);
+                let name = row.name.as_deref().unwrap_or_default();
+                format!("{above}/{}", component(name, || format!("node_{number}")))
+            }
+        };
+        let channels = std::mem::take(&mut self.channels[number as usize]);
+        self.push(output, Node { path, parent, local: local(row), channels })
+    }
+
+    fn push(&mut self, output: &mut Output, mut node: Node) -> Result<u32, Fault> {
+        node.path = self.paths.claim(node.path);
+        let bytes = size_of::<Node>() + 2 * node.path.len();
+        output.budget.take(bytes as u64, || "nodes".to_string())?;
+        let above = node.parent.is_none_or(|parent| self.uniform[parent as usize]);
+        self.uniform.push(above && scales_evenly(&node));
+        output.scene.nodes.push(node);
+        Ok(output.scene.nodes.len() as u32 - 1)
+    }
+
+    /// Adds the camera, light and meshes of a node.
+    fn furnish(
+        &mut self,
+        output: &mut Output,
+        number: u32,
+        row: &Row,
+        node: u32,
+    ) -> Result<(), Fault> {
+        let object = label("node", number as usize, row.name.as_deref());
+        if let Some(camera) = row.camera {
+            cameras::compile(self.source, output, camera, row, node, &object)?;
+        }
+        let lux = UsdLux::of(&row.extras, &object)?;
+        let light = lights::of_node(self.source, output, row, lux.as_ref(), node, &object)?;
+        let has_light = light.is_some();
+        output.scene.lights.extend(light);
+        let shaping = lights::shaping(lux.as_ref(), &object)?;
+        let forced = lux.as_ref().is_some_and(|lux| lux.force);
+        let Some(mesh) = row.mesh else {
+            if row.extensions.instancing.is_some() {
+                output.notes.add(object, "has instances, but no mesh; left out");
+            }
+            return Ok(());
+        };
+        let placed = Placed { lux: lux.as_ref(), shaping, forced, has_light, object: &object };
+        let Some(instances) = &row.extensions.instancing else {
+            return self.put_mesh(output, mesh, node, &placed);
+        };
+        for (i, local) in
+            instancing::transforms(self.source, output, instances, &object)?.into_iter().enumerate()
+        {
+            let path = format!("{}[{i}]", output.scene.nodes[node as usize].path);
+            let child = self.push(output, Node::fixed(path, Some(node), local))?;
+            // The light of a node is not its instances'.
+            self.put_mesh(output, mesh, child, &Placed { has_light: false, ..placed })?;
+        }
+        Ok(())
+    }
+
+    /// Puts a mesh at a node of the scene: as a sphere light if it stands for one.
+    fn put_mesh(
+        &mut self,
+        output: &mut Output,
+        mesh: u32,
+        node: u32,
+        placed: &Placed,
+    ) -> Result<(), Fault> {
+        if let Some(radius) = placed.sphere_radius()? {
+            if self.uniform[node as usize] {
+                let material = self.meshes.only_material(self.source, output, mesh)?;
+                let material = material.map(|m| &output.scene.materials[m as usize]);
+                if let Some(sphere) = lights::sphere(material, radius, node, placed) {
+                    output.scene.lights.push(sphere);
+                    return Ok(());
+                }
+            }
+            output.notes.add(
+                placed.object,
+                "its sphere is stretched or textured; sampled as the triangles that stand for it",
+            );
+        }
+        let compiled = self.meshes.primitives(self.source, output, mesh)?;
+        let row = &self.source.document.meshes[mesh as usize];
+        for (i, &compiled) in compiled.iter().enumerate() {
+            let Some(compiled) = compiled else { continue };
+            let above = output.scene.nodes[node as usize].path.clone();
+            // A lone mesh is the node's prim; several, or one beside a light, are below it.
+            let own = usd_path(&row.primitives[i].extras).and_then(|path| path.rsplit('/').next());
+            let path = match own {
+                Some(own) => self.paths.claim(format!("{above}/{own}")),
+                None if row.primitives.len() > 1 => self.paths.claim(format!("{above}/prim_{i}")),
+                None if placed.has_light => self.paths.claim(format!("{above}/mesh")),
+                None => above,
+            };
+            let (shaping, forced): (Option<Shaping>, bool) = (placed.shaping, placed.forced);
+            let bytes = size_of::<Instance>() + 2 * path.len();
+            output.budget.take(bytes as u64, || placed.object.to_string())?;
+            output.scene.instances.push(Instance { path, node, mesh: compiled, shaping, forced });
+        }
+        Ok(())
+    }
+}
+
+fn local(row: &Row) -> Trs {
+    if let Some(matrix) = row.matrix {
+        let columns = matrix.map(|value| value.f64());
+        return Trs::Matrix(DAffine3::from_mat4(DMat4::from_cols_array(&columns)));
+    }
+    let vector = |values: [super::document::Real; 3]| DVec3::from(values.map(|value| value.f64()));
+    let rotation = row.rotation.map(|parts| DQuat::from_array(parts.map(|part| part.f64())));
+    Trs::Parts {
+        translation: row.translation.map_or(DVec3::ZERO, vector),
+        // Validation has seen that it has a length.
+        rotation: rotation.map_or(DQuat::IDENTITY, DQuat::normalize),
+        scale: row.scale.map_or(DVec3::ONE, vector),
+    }
+}
+
+/// Whether a node's own transform keeps spheres spheres at every time.
+fn scales_evenly(node: &Node) -> bool {
+    let even = |scale: DVec3| {
+        let size = scale.abs();
+        size.max_element() - size.min_element() <= UNIFORM_TOLERANCE * size.max_element()
+    };
+    let at_rest = match node.local {
+        Trs::Parts { scale, .. } => even(scale),
+        Trs::Matrix(matrix) => {
+            let [x, y, z] = [matrix.matrix3.x_axis, matrix.matrix3.y_axis, matrix.matrix3.z_axis];
+            let lengths = DVec3::new(x.length(), y.length(), z.length());
+            let skew = x.dot(y).abs().max(y.dot(z).abs()).max(z.dot(x).abs());
+            even(lengths) && skew <= UNIFORM_TOLERANCE * lengths.max_element().powi(2)
+        }
+    };
+    let animated = |channel: &Channel| match channel {
+        Channel::Scale(keys) => keys.values.iter().all(|scale| even(scale.as_dvec3())),
+        _ => true,
+    };
+    at_rest && node.channels.iter().all(animated)
+}

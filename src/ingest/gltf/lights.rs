@@ -1,0 +1,157 @@
+//! Lights that are not meshes: `KHR_lights_punctual`, and what `extras.usdLux` adds.
+
+use super::document::{Light as Row, Node, UsdLux, reals};
+use super::{Output, Source};
+use crate::ingest::error::Fault;
+use crate::ingest::image::{self, Coding};
+use crate::math::color::Rgb;
+use crate::scene::{Light, LightKind, Material, Shaping, Texture, Wrap};
+
+/// What a node says of the meshes at it.
+#[derive(Clone, Copy)]
+pub(super) struct Placed<'a> {
+    pub lux: Option<&'a UsdLux>,
+    pub shaping: Option<Shaping>,
+    pub forced: bool,
+    /// Whether a light has the node's path already.
+    pub has_light: bool,
+    pub object: &'a str,
+}
+
+impl Placed<'_> {
+    /// The radius of the sphere light that the mesh stands for, if it does.
+    pub(super) fn sphere_radius(&self) -> Result<Option<f32>, Fault> {
+        let Some(lux) = self.lux.filter(|lux| lux.kind == "SphereLight") else { return Ok(None) };
+        match lux.radius.map(|radius| radius.f32()) {
+            Some(radius) if radius <= 0.0 => {
+                Err(Fault::new(self.object, "extras.usdLux: radius is not positive"))
+            }
+            radius => Ok(radius),
+        }
+    }
+}
+
+/// The light at a node, other than its meshes.
+pub(super) fn of_node(
+    source: &Source,
+    output: &mut Output,
+    row: &Node,
+    lux: Option<&UsdLux>,
+    node: u32,
+    object: &str,
+) -> Result<Option<Light>, Fault> {
+    if lux.is_some_and(|lux| lux.values.is_some()) {
+        output.notes.add(object, "animated light values are not read; the light is constant");
+    }
+    let forced = lux.is_some_and(|lux| lux.force);
+    let light = |kind, range_m| Some(Light { node, kind, range_m, forced });
+    if let Some(lux) = lux.filter(|lux| lux.kind == "DomeLight") {
+        return Ok(light(dome(source, output, lux, object)?, None));
+    }
+    let Some(punctual) = &row.extensions.light else {
+        if let Some(lux) = lux.filter(|_| row.mesh.is_none()) {
+            output.notes.add(object, format!("a {} has no carrier in glTF; left out", lux.kind));
+        }
+        return Ok(None);
+    };
+    let punctual = &source.document.lights[punctual.light as usize];
+    let kind = match shaping(lux, object)? {
+        Some(shaping) if punctual.kind != "directional" => {
+            LightKind::Spot { intensity_cd: strength(punctual, object)?, shaping }
+        }
+        _ => punctual_kind(punctual, lux, object)?,
+    };
+    let is_distant = matches!(kind, LightKind::Distant { .. });
+    let range_m = punctual.range.filter(|_| !is_distant).map(|range| range.f32());
+    Ok(light(kind, range_m))
+}
+
+fn punctual_kind(row: &Row, lux: Option<&UsdLux>, object: &str) -> Result<LightKind, Fault> {
+    let strength = strength(row, object)?;
+    Ok(match (row.kind.as_str(), &row.spot) {
+        ("directional", _) => {
+            let angle = lux.and_then(|lux| lux.angle).map_or(0.0, |angle| angle.f32());
+            if !(0.0..=360.0).contains(&angle) {
+                return Err(Fault::new(object, "extras.usdLux: angle is not in [0, 360]"));
+            }
+            LightKind::Distant { irradiance_lux: strength, angle_rad: angle.to_radians() }
+        }
+        ("spot", Some(spot)) => {
+            let (inner, outer) = (spot.inner_cone_angle.f32(), spot.outer_cone_angle.f32());
+            let outer_rad = outer.min(std::f32::consts::FRAC_PI_2);
+            let shaping = Shaping::Khr { inner_rad: inner.min(outer_rad), outer_rad };
+            LightKind::Spot { intensity_cd: strength, shaping }
+        }
+        _ => LightKind::Point { intensity_cd: strength },
+    })
+}
+
+fn strength(row: &Row, object: &str) -> Result<Rgb, Fault> {
+    let strength = Rgb::from(reals(row.color)) * row.intensity.f32();
+    match strength.is_finite() {
+        true => Ok(strength),
+        false => Err(Fault::new(object, "its light is too strong for a 32-bit number")),
+    }
+}
+
+/// The emission profile that `extras.usdLux` gives.
+pub(super) fn shaping(lux: Option<&UsdLux>, object: &str) -> Result<Option<Shaping>, Fault> {
+    let Some(shaping) = lux.and_then(|lux| lux.shaping.as_ref()) else { return Ok(None) };
+    // UsdLux's own default.
+    let cone = shaping.cone_angle.map_or(90.0, |angle| angle.f32());
+    let tint = reals(shaping.focus_tint);
+    if cone < 0.0 || tint.iter().any(|&part| part < 0.0) {
+        return Err(Fault::new(object, "extras.usdLux: shaping has a negative cone or tint"));
+    }
+    Ok(Some(Shaping::Usd {
+        cone_rad: cone.to_radians(),
+        softness: shaping.cone_softness.f32().clamp(0.0, 1.0),
+        // A negative focus is ignored by UsdLux's definition.
+        focus: shaping.focus.f32().max(0.0),
+        focus_tint: tint,
+    }))
+}
+
+/// The sphere light that a tessellated mesh of this material stands for; `None` if the mesh's
+/// emission is not that of a sphere light.
+pub(super) fn sphere(
+    material: Option<&Material>,
+    radius: f32,
+    node: u32,
+    placed: &Placed,
+) -> Option<Light> {
+    let material = material.filter(|m| m.emits() && m.emission_texture.is_none())?;
+    let radiance_nits = material.emission_nits;
+    let kind = LightKind::Sphere { radiance_nits, radius, shaping: placed.shaping };
+    Some(Light { node, kind, range_m: None, forced: placed.forced })
+}
+
+fn dome(
+    source: &Source,
+    output: &mut Output,
+    lux: &UsdLux,
+    object: &str,
+) -> Result<LightKind, Fault> {
+    let radiance = lux.radiance.map_or([1.0; 3], reals);
+    if radiance.iter().any(|&part| part < 0.0) {
+        return Err(Fault::new(object, "extras.usdLux: radiance is negative"));
+    }
+    let texture = match &lux.texture {
+        Some(uri) => {
+            let object = format!("{object}, dome texture {uri:?}");
+            let bytes = source.folder.read_uri(uri, &object)?;
+            let picture = image::decode(&bytes, Coding::Srgb, &object, &mut output.budget)?;
+            output.scene.textures.push(Texture {
+                name: uri.clone(),
+                width: picture.width,
+                height: picture.height,
+                pixels: picture.pixels,
+                wrap: [Wrap::Repeat, Wrap::Clamp],
+                bilinear: true,
+            });
+            Some(output.scene.textures.len() as u32 - 1)
+        }
+        None => None,
+    };
+    Ok(LightKind::Dome { radiance_nits: radiance.into(), texture })
+}

@@ -1,0 +1,145 @@
+//! Materials, compiled when the first mesh uses them.
+
+use super::document::{self, Material as Row, SpecularGlossiness, TextureInfo, label, reals};
+use super::textures::Textures;
+use super::{Output, Source};
+use crate::ingest::error::Fault;
+use crate::ingest::image::Coding;
+use crate::math::color::Rgb;
+use crate::scene::{AlphaMode, Material, TextureUse};
+
+/// Reflectance at normal incidence of the default dielectric: index of refraction 1.5.
+const DEFAULT_REFLECTANCE: f32 = 0.04;
+
+/// The materials that were compiled, by their number in the file.
+pub(super) struct Materials {
+    compiled: Vec<Option<u32>>,
+    textures: Textures,
+}
+
+impl Materials {
+    pub(super) fn new(source: &Source) -> Materials {
+        let compiled = vec![None; source.document.materials.len()];
+        Materials { compiled, textures: Textures::default() }
+    }
+
+    /// The scene's number of a material of the file.
+    pub(super) fn index(
+        &mut self,
+        source: &Source,
+        output: &mut Output,
+        number: u32,
+    ) -> Result<u32, Fault> {
+        if let Some(known) = self.compiled[number as usize] {
+            return Ok(known);
+        }
+        let row = &source.document.materials[number as usize];
+        let object = label("material", number as usize, row.name.as_deref());
+        let material = self.compile(source, output, row, object)?;
+        output.scene.materials.push(material);
+        let index = output.scene.materials.len() as u32 - 1;
+        self.compiled[number as usize] = Some(index);
+        Ok(index)
+    }
+
+    fn compile(
+        &mut self,
+        source: &Source,
+        output: &mut Output,
+        row: &Row,
+        object: String,
+    ) -> Result<Material, Fault> {
+        let mut texture = |info: &Option<TextureInfo>, coding| -> Result<_, Fault> {
+            match info {
+                Some(info) => self.textures.texture_use(source, output, info, coding),
+                None => Ok(None),
+            }
+        };
+        let pbr = &row.pbr_metallic_roughness;
+        let extensions = &row.extensions;
+        let [red, green, blue, opacity] = reals(pbr.base_color_factor);
+        let strength = extensions.emissive_strength.as_ref();
+        let strength = strength.map_or(1.0, |strength| strength.emissive_strength.f32());
+        let emission = Rgb::from(reals(row.emissive_factor)) * strength;
+        if !emission.is_finite() {
+            return Err(Fault::new(object, "its emission is too strong for a 32-bit number"));
+        }
+        let mut material = Material {
+            name: row.name.clone().unwrap_or_else(|| object.clone()),
+            base_color: Rgb::new(red, green, blue),
+            base_color_texture: None,
+            opacity,
+            alpha_mode: match row.alpha_mode {
+                document::AlphaMode::Opaque => AlphaMode::Opaque,
+                document::AlphaMode::Mask => AlphaMode::Mask(row.alpha_cutoff.f32()),
+                document::AlphaMode::Blend => AlphaMode::Blend,
+            },
+            metallic: pbr.metallic_factor.f32(),
+            roughness: pbr.roughness_factor.f32(),
+            emission_nits: emission,
+            double_sided: row.double_sided,
+            normal_texture: texture(&row.normal_texture, Coding::Linear)?,
+            normal_scale: row.normal_texture.as_ref().map_or(1.0, |info| info.scale.f32()),
+            ..Material::default()
+        };
+        // A texture that nothing of is left of is not decoded.
+        if emission.max_element() > 0.0 {
+            material.emission_texture = texture(&row.emissive_texture, Coding::Srgb)?;
+        }
+        if let Some(ior) = &extensions.ior {
+            material.ior = ior.ior.f32();
+        }
+        if let Some(specular) = &extensions.specular {
+            material.specular = specular.specular_factor.f32();
+            material.specular_color = Rgb::from(reals(specular.specular_color_factor));
+            if material.specular > 0.0 {
+                material.specular_texture = texture(&specular.specular_texture, Coding::Linear)?;
+                material.specular_color_texture =
+                    texture(&specular.specular_color_texture, Coding::Srgb)?;
+            }
+        }
+        if let Some(glossy) = &extensions.specular_glossiness {
+            material.base_color_texture = texture(&glossy.diffuse_texture, Coding::Srgb)?;
+            approximate_glossiness(&mut material, glossy);
+            output.notes.add(
+                object.clone(),
+                "KHR_materials_pbrSpecularGlossiness is approximated; its specular texture is not read",
+            );
+        } else {
+            material.base_color_texture = texture(&pbr.base_color_texture, Coding::Srgb)?;
+            material.metallic_roughness_texture =
+                texture(&pbr.metallic_roughness_texture, Coding::Linear)?;
+        }
+        for extension in extensions.others.keys() {
+            let text = match extension.as_str() {
+                "KHR_materials_unlit" => "is unlit; drawn as a surface that light falls on".into(),
+                extension => format!("{extension} is not read"),
+            };
+            output.notes.add(object.clone(), text);
+        }
+        Ok(material)
+    }
+}
+
+/// A dielectric of the same diffuse colour, roughness and reflectance.
+fn approximate_glossiness(material: &mut Material, glossy: &SpecularGlossiness) {
+    let [red, green, blue, opacity] = reals(glossy.diffuse_factor);
+    material.base_color = Rgb::new(red, green, blue);
+    material.opacity = opacity;
+    material.metallic = 0.0;
+    material.roughness = 1.0 - glossy.glossiness_factor.f32();
+    material.specular_color = Rgb::from(reals(glossy.specular_factor)) / DEFAULT_REFLECTANCE;
+}
+
+/// The texture sets that a material's textures are looked up by.
+pub(super) fn uv_sets(material: &Material) -> impl Iterator<Item = u32> {
+    let uses: [Option<TextureUse>; 6] = [
+        material.base_color_texture,
+        material.metallic_roughness_texture,
+        material.specular_texture,
+        material.specular_color_texture,
+        material.normal_texture,
+        material.emission_texture,
+    ];
+    uses.into_iter().flatten().map(|usage| usage.uv_set)
+}

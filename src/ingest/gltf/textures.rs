@@ -1,0 +1,119 @@
+//! Textures: images with a sampling rule, decoded when the first material uses them.
+
+use super::document::{Image, TextureInfo, label};
+use super::{Output, Source};
+use crate::ingest::error::Fault;
+use crate::ingest::image::{self, Coding};
+use crate::scene::{Texture, TextureUse, Wrap};
+use glam::{Affine2, Mat2, Vec2};
+use std::borrow::Cow;
+use std::collections::HashSet;
+
+/// What tells textures apart: two with the same key are one.
+type Key = (u32, [Wrap; 2], bool, Coding);
+
+/// The textures that were compiled.
+#[derive(Default)]
+pub(super) struct Textures {
+    compiled: Vec<(Key, u32)>,
+    /// Images that cannot be read and were noted.
+    unread: HashSet<u32>,
+}
+
+/// Every image leads to something inside the scene's folder, whether it is used or not.
+pub(super) fn check_references(source: &Source) -> Result<(), Fault> {
+    for (i, row) in source.document.images.iter().enumerate() {
+        let object = label("image", i, row.name.as_deref());
+        match &row.uri {
+            Some(uri) if uri.starts_with("data:") => drop(source.folder.read_uri(uri, &object)?),
+            Some(uri) => drop(source.folder.resolve_uri(uri, &object)?),
+            None => {}
+        }
+    }
+    Ok(())
+}
+
+impl Textures {
+    /// Compiles a material's use of a texture; `None` if its image is not read.
+    pub(super) fn texture_use(
+        &mut self,
+        source: &Source,
+        output: &mut Output,
+        info: &TextureInfo,
+        coding: Coding,
+    ) -> Result<Option<TextureUse>, Fault> {
+        let row = &source.document.textures[info.index as usize];
+        let Some(image) = row.source else {
+            let object = label("texture", info.index as usize, row.name.as_deref());
+            output.notes.add(object, "has no image that can be read; drawn without");
+            return Ok(None);
+        };
+        let sampler = row.sampler.map(|sampler| &source.document.samplers[sampler as usize]);
+        let wrap = [sampler.and_then(|s| s.wrap_s), sampler.and_then(|s| s.wrap_t)].map(wrap);
+        const NEAREST: u32 = 9728;
+        let bilinear = sampler.and_then(|s| s.mag_filter) != Some(NEAREST);
+        let Some(texture) = self.texture(source, output, (image, wrap, bilinear, coding))? else {
+            return Ok(None);
+        };
+        let transform = info.extensions.transform.as_ref();
+        let uv_set = transform.and_then(|transform| transform.tex_coord).unwrap_or(info.tex_coord);
+        let transform = transform.map(|transform| {
+            let scale = transform.scale.map(|value| value.f32());
+            let (sin, cos) = transform.rotation.f32().sin_cos();
+            // v points down, so counter-clockwise is this way round.
+            let rotation = Mat2::from_cols(Vec2::new(cos, -sin), Vec2::new(sin, cos));
+            Affine2 {
+                matrix2: rotation * Mat2::from_diagonal(scale.into()),
+                translation: transform.offset.map(|value| value.f32()).into(),
+            }
+        });
+        Ok(Some(TextureUse { texture, uv_set, transform }))
+    }
+
+    fn texture(
+        &mut self,
+        source: &Source,
+        output: &mut Output,
+        key: Key,
+    ) -> Result<Option<u32>, Fault> {
+        let (image, wrap, bilinear, coding) = key;
+        if let Some((_, texture)) = self.compiled.iter().find(|(known, _)| *known == key) {
+            return Ok(Some(*texture));
+        }
+        if self.unread.contains(&image) {
+            return Ok(None);
+        }
+        let row = &source.document.images[image as usize];
+        let object = label("image", image as usize, row.name.as_deref());
+        let bytes = bytes(source, row, &object)?;
+        if !image::is_surface_format(&bytes) {
+            output.notes.add(object, "is neither PNG nor JPEG; drawn without");
+            self.unread.insert(image);
+            return Ok(None);
+        }
+        let picture = image::decode(&bytes, coding, &object, &mut output.budget)?;
+        let uri = row.uri.as_deref().filter(|uri| !uri.starts_with("data:"));
+        let name = row.name.as_deref().or(uri).unwrap_or(&object).to_string();
+        let (width, height, pixels) = (picture.width, picture.height, picture.pixels);
+        output.scene.textures.push(Texture { name, width, height, pixels, wrap, bilinear });
+        let texture = output.scene.textures.len() as u32 - 1;
+        self.compiled.push((key, texture));
+        Ok(Some(texture))
+    }
+}
+
+fn bytes<'a>(source: &'a Source, row: &Image, object: &str) -> Result<Cow<'a, [u8]>, Fault> {
+    match (row.buffer_view, &row.uri) {
+        (Some(view), _) => Ok(Cow::Borrowed(source.buffers.view(source.document, view, object)?)),
+        (None, Some(uri)) => Ok(Cow::Owned(source.folder.read_uri(uri, object)?)),
+        (None, None) => Err(Fault::new(object, "has no data")),
+    }
+}
+
+fn wrap(code: Option<u32>) -> Wrap {
+    match code {
+        Some(33071) => Wrap::Clamp,
+        Some(33648) => Wrap::Mirror,
+        _ => Wrap::Repeat,
+    }
+}

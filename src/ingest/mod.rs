@@ -1,0 +1,54 @@
+//! Floor 2: files in, a scene index out.
+//!
+//! [`load`] compiles a glTF (`.gltf`, `.glb`) or OBJ (`.obj`) file to [`Scene`]'s normal form, so
+//! that nothing above asks where a prim came from. What the scene cannot say is approximated or
+//! left out, and said in [`Scene::notes`].
+//!
+//! Files are not trusted. They are validated before they are read: whatever a file holds, the
+//! answer is a scene that keeps its promises or one [`IngestError`] that names the file, the object
+//! in it and the remedy. A file reads nothing outside its own folder, and asks for no memory out of
+//! proportion to its size.
+//!
+//! This is not a validator of the whole glTF specification: what cannot mislead the renderer (an
+//! empty list, an undeclared extension that is not read) passes. And it is not an exporter's
+//! counterpart only: `extras` that `scripts/usd_to_gltf.py` writes (see `carriers.md`) are read,
+//! but any glTF with emissive materials or punctual lights is as good.
+
+mod budget;
+mod error;
+mod gltf;
+mod image;
+mod normals;
+mod notes;
+mod obj;
+mod paths;
+mod uri;
+
+pub use error::IngestError;
+
+use crate::scene::Scene;
+use error::Fault;
+use std::path::Path;
+
+/// Reads a scene file, and the files it refers to. The format follows from the file's extension.
+pub fn load(path: &Path) -> Result<Scene, IngestError> {
+    let extension = path.extension().unwrap_or_default().to_ascii_lowercase();
+    let scene = match extension.to_str() {
+        Some("gltf") => gltf::load(path, false),
+        Some("glb") => gltf::load(path, true),
+        Some("obj") => obj::load(path),
+        _ => Err(Fault::new("file", "is in a format that is not read")
+            .remedy("convert it to .gltf, .glb or .obj; USD with scripts/usd_to_gltf.py")),
+    };
+    match scene {
+        Ok(scene) => Ok(Scene { source: path.to_path_buf(), ..scene }),
+        Err(fault) => Err(fault.in_file(path)),
+    }
+}
+
+/// The bytes of the scene file itself.
+fn read_file(path: &Path) -> Result<Vec<u8>, Fault> {
+    std::fs::read(path).map_err(|error| {
+        Fault::new("file", format!("cannot be read: {error}")).remedy("check the path")
+    })
+}

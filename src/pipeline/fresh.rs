@@ -1,0 +1,134 @@
+//! Opening a tree file, and telling whether it still belongs to a scene.
+
+use super::{Survey, survey};
+use crate::emitter::{Emitters, LightOverflow};
+use crate::light_tree::{LightSummary, LightTree};
+use crate::scene::Scene;
+use crate::store::{self, Mmap, StoreError};
+use std::collections::BTreeMap;
+use std::fmt;
+use std::path::{Path, PathBuf};
+
+/// A tree over a mapped file.
+pub type OpenedTree = LightTree<Mmap>;
+
+/// Why a tree file cannot be used.
+#[derive(Debug, thiserror::Error)]
+pub enum TreeError {
+    /// The file cannot be read.
+    #[error("{}: {source}", path.display())]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// Why not.
+        source: std::io::Error,
+    },
+    /// The file is not what the format says.
+    #[error("{}: {source}", path.display())]
+    Broken {
+        /// The file.
+        path: PathBuf,
+        /// The rule that is broken.
+        source: StoreError,
+    },
+    /// The scene has changed since.
+    #[error("{}: {source}", path.display())]
+    Stale {
+        /// The file.
+        path: PathBuf,
+        /// What changed.
+        source: StaleTree,
+    },
+    /// The scene has a light that no tree can hold.
+    #[error(transparent)]
+    Overflow(#[from] LightOverflow),
+}
+
+/// Maps and opens a tree file; with `verify`, proves that it keeps the format's promises.
+///
+/// # Errors
+/// If the file cannot be read or breaks a rule.
+pub fn open_tree(path: &Path, verify: bool) -> Result<OpenedTree, TreeError> {
+    let map = store::map(path).map_err(|source| TreeError::Io { path: path.into(), source })?;
+    let broken = |source| TreeError::Broken { path: path.into(), source };
+    let tree = LightTree::open(map).map_err(broken)?;
+    if verify {
+        tree.verify().map_err(broken)?;
+    }
+    Ok(tree)
+}
+
+/// How many lights a message names.
+const MOST_NAMED: usize = 10;
+
+/// What changed in a scene since its tree was built.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct StaleTree {
+    /// Lights that the tree does not have.
+    pub added: Vec<String>,
+    /// Lights that the scene does not have.
+    pub removed: Vec<String>,
+    /// Lights that are not what they were.
+    pub dirtied: Vec<String>,
+}
+
+impl fmt::Display for StaleTree {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "the tree is stale")?;
+        let kinds = [("added", &self.added), ("removed", &self.removed), ("dirtied", &self.dirtied)];
+        let (mut left, mut unnamed) = (MOST_NAMED, 0);
+        for (verb, paths) in kinds.into_iter().filter(|(_, paths)| !paths.is_empty()) {
+            let named = &paths[..paths.len().min(left)];
+            left -= named.len();
+            unnamed += paths.len() - named.len();
+            write!(f, "; {verb}: {}", if named.is_empty() { "(more)".into() } else { named.join(", ") })?;
+        }
+        if unnamed > 0 {
+            write!(f, " and {unnamed} more")?;
+        }
+        if [&self.added, &self.removed, &self.dirtied].iter().all(|paths| paths.is_empty()) {
+            write!(f, ": it was built by another version of the algorithm")?;
+        }
+        write!(f, ". Build it again: candelabra build SCENE -o TREE")
+    }
+}
+
+impl std::error::Error for StaleTree {}
+
+/// Compares a tree with the scene it should belong to.
+///
+/// # Errors
+/// [`TreeError::Stale`] with the lights that changed, at most ten of them named in the message.
+pub fn check_fresh<D: AsRef<[u8]>>(
+    tree: &LightTree<D>,
+    path: &Path,
+    scene: &Scene,
+    emitters: &Emitters,
+) -> Result<(), TreeError> {
+    let frames: Vec<i32> = tree.frames().iter().map(|row| row.frame).collect();
+    let Survey { lights, fingerprint, .. } = survey(scene, emitters, &frames)?;
+    if fingerprint == tree.fingerprint() {
+        return Ok(());
+    }
+    Err(TreeError::Stale { path: path.into(), source: compare(tree, &lights) })
+}
+
+fn compare<D: AsRef<[u8]>>(tree: &LightTree<D>, now: &[LightSummary]) -> StaleTree {
+    let before: BTreeMap<&str, _> =
+        tree.lights().iter().map(|row| (tree.light_path(row), (row.fingerprint, row.moves))).collect();
+    let after: BTreeMap<&str, _> = now
+        .iter()
+        .map(|light| (light.path.as_str(), (light.fingerprint, u32::from(light.moves))))
+        .collect();
+    let names = |paths: &mut dyn Iterator<Item = &&str>| paths.map(|p| p.to_string()).collect();
+    StaleTree {
+        added: names(&mut after.keys().filter(|path| !before.contains_key(*path))),
+        removed: names(&mut before.keys().filter(|path| !after.contains_key(*path))),
+        dirtied: names(
+            &mut after
+                .iter()
+                .filter(|(path, now)| before.get(*path).is_some_and(|then| then != *now))
+                .map(|(path, _)| path),
+        ),
+    }
+}

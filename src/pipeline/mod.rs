@@ -1,0 +1,25 @@
+//! Floor 5: jobs, the only place where ingest meets the tree.
+//!
+//! [`load_scene`] reads a scene; [`survey`] finds out what its tree depends on; [`build_tree`] builds
+//! the trees of a shot; [`check_fresh`] tells whether a tree still belongs to a scene, and if not,
+//! which lights changed.
+
+mod build;
+mod fresh;
+mod survey;
+
+pub use build::{BuildOptions, build_tree};
+pub use fresh::{OpenedTree, StaleTree, TreeError, check_fresh, open_tree};
+pub use survey::{Survey, survey};
+
+use crate::ingest::{self, IngestError};
+use crate::scene::Scene;
+use std::path::Path;
+
+/// Reads a scene from a `.gltf`, `.glb` or `.obj` file.
+///
+/// # Errors
+/// Whatever is wrong with the file; see [`IngestError`].
+pub fn load_scene(path: &Path) -> Result<Scene, IngestError> {
+    ingest::load(path)
+}
