@@ -2,3 +2,4 @@
 pub mod math;
 pub mod render;
 pub mod scene;
+pub mod store;

@@ -1,0 +1,3 @@
+//! Floor 1: bytes on disk.
+
+pub mod atomic;
