@@ -1,8 +1,35 @@
-//! Floor 3: the renderer.
+//! Floor 3: the renderer: a unidirectional path tracer that finds its lights through the tree.
+//!
+//! A [`RenderDelegate`] prepares a shot once and renders its frames; [`RenderSettings`] are the knobs,
+//! [`RenderBuffers`](buffers::RenderBuffers) what a frame leaves behind. It knows a scene, its
+//! emitters and a light tree; it never sees the files that these came from.
+//!
+//! | module | question |
+//! |---|---|
+//! | [`delegate`] | what is done once for a shot, and what for each frame? |
+//! | [`path`] | how does light get from a lamp to the eye? |
+//! | [`picker`] | which light is sampled at a point, and with what probability? |
+//! | [`camera`] | which ray belongs to a point of the picture? |
+//! | [`rays`] | what does a ray hit, and is a light visible? |
+//! | [`surface`] | what is there: normals, textures, material? |
+//! | [`bsdf`] | how does it reflect? |
+//! | [`buffers`] | what is kept of a frame? |
+//! | [`exr`], [`png`] | how does it get to the disk? |
+//! | [`frames`], [`frame_names`] | which frames, and under which names? |
+
 pub mod bsdf;
+pub mod buffers;
 pub mod camera;
+pub mod delegate;
+pub mod exr;
+pub mod frame_names;
+pub mod frames;
 pub mod path;
 pub mod picker;
+pub mod png;
 pub mod rays;
 pub mod settings;
 pub mod surface;
+
+pub use delegate::{FrameError, Progress, RenderDelegate, RenderedFrame};
+pub use settings::{LightStrategy, RenderSettings};

@@ -17,6 +17,7 @@ use crate::math::Frame;
 use crate::math::color::Rgb;
 use crate::scene::{AlphaMode, Material, Mesh, Pose, Scene, TextureUse};
 use glam::{Mat3, Vec2, Vec3, Vec4};
+use std::ops::{Add, Mul};
 
 /// The smallest cosine between `wo` and the shading normal.
 const LEAST_COSINE: f32 = 1e-3;
@@ -169,12 +170,10 @@ impl<'a> Surfaces<'a> {
 }
 
 impl At<'_> {
-    fn interpolate<T: Copy + std::ops::Mul<f32, Output = T> + std::ops::Add<Output = T>>(
-        &self,
-        values: &[T],
-    ) -> T
+    /// Zero where there are no values.
+    fn interpolate<T>(&self, values: &[T]) -> T
     where
-        T: Default,
+        T: Copy + Default + Mul<f32, Output = T> + Add<Output = T>,
     {
         if values.is_empty() {
             return T::default();

@@ -1,0 +1,295 @@
+//! Render buffers as OpenEXR files.
+//!
+//! One part: beauty as the unnamed RGBA layer, then what is asked for of `Z`, `N.X/Y/Z`,
+//! `albedo.R/G/B`, `variance.R/G/B` and `sampleCount`, ZIP-compressed scan lines. Beauty is half or
+//! float, all else float. The same buffers give the same bytes: what the program has to say about
+//! a frame is one JSON text in the attribute [`METADATA`], because crate `exr` keeps custom
+//! attributes in a hash map and several would be written in a random order.
+
+use super::buffers::{Pixel, RenderBuffers};
+use crate::store::write_atomically;
+use exr::block::reader::Reader;
+use exr::image::write::WritableImage;
+use exr::image::{AnyChannel, AnyChannels, Encoding, FlatSamples, Image, Layer};
+use exr::meta::attribute::{AttributeValue, Text};
+use exr::meta::header::LayerAttributes;
+use exr::prelude::{SmallVec, f16};
+use std::fs::File;
+use std::io::{self, BufReader};
+use std::path::Path;
+
+/// Name of the attribute that holds the JSON text.
+pub const METADATA: &str = "candelabra";
+
+/// What to write.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ExrOptions {
+    /// Beauty as 32-bit floats; otherwise 16-bit, clamped to what they hold (65504).
+    pub float_beauty: bool,
+    /// `Z`: metres in front of the camera.
+    pub depth: bool,
+    /// `N.X`, `N.Y`, `N.Z`: shading normal, world space.
+    pub normal: bool,
+    /// `albedo.R`, `albedo.G`, `albedo.B`.
+    pub albedo: bool,
+    /// `variance.R`, `variance.G`, `variance.B`: of the pixel's mean.
+    pub variance: bool,
+    /// `sampleCount`.
+    pub sample_count: bool,
+}
+
+/// Writes a frame, all or nothing. `metadata` is a JSON text.
+pub fn write_exr(
+    path: &Path,
+    buffers: &RenderBuffers,
+    options: &ExrOptions,
+    metadata: &str,
+) -> io::Result<()> {
+    let image = image_of(buffers, options, metadata);
+    write_atomically(path, |file| {
+        let writer = image.write();
+        // Crate exr starts threads of its own, as many as there are cores.
+        let written = if rayon::current_num_threads() > 1 {
+            writer.to_buffered(file)
+        } else {
+            writer.non_parallel().to_buffered(file)
+        };
+        written.map_err(into_io)
+    })
+}
+
+/// The JSON text of a file that [`write_exr`] made, if the file is whole. `None` if it is not there,
+/// is no such file, or ends early. Reads the header and the last rows, not the picture.
+pub fn read_metadata(path: &Path) -> Option<String> {
+    let reader = Reader::read_from_buffered(BufReader::new(File::open(path).ok()?), false).ok()?;
+    let header = reader.headers().first()?;
+    let attribute = header.own_attributes.other.get(METADATA.as_bytes())?;
+    let AttributeValue::Text(text) = attribute else { return None };
+    let text = text.to_string();
+    // Rows are stored from the top: the file is whole if its last block is.
+    let height = header.layer_size.height();
+    let is_last = |_: &_, _, block: exr::block::BlockIndex| {
+        block.pixel_position.y() + block.pixel_size.height() >= height
+    };
+    let mut blocks = reader.filter_chunks(true, is_last).ok()?;
+    blocks.try_for_each(|block| block.map(drop)).ok()?;
+    Some(text)
+}
+
+fn image_of(
+    buffers: &RenderBuffers,
+    options: &ExrOptions,
+    metadata: &str,
+) -> Image<Layer<AnyChannels<FlatSamples>>> {
+    let mut channels = Channels { pixels: buffers.pixels(), list: Default::default() };
+    let rgb = ["R", "G", "B"];
+    for (axis, name) in rgb.into_iter().enumerate() {
+        channels.add_beauty(name, options.float_beauty, |pixel| pixel.beauty[axis]);
+        let layered = |layer: &str| format!("{layer}.{name}");
+        if options.albedo {
+            channels.add(layered("albedo"), |pixel| pixel.albedo[axis]);
+        }
+        if options.variance {
+            channels.add(layered("variance"), |pixel| pixel.variance[axis]);
+        }
+        if options.normal {
+            channels.add(format!("N.{}", ["X", "Y", "Z"][axis]), |pixel| pixel.normal[axis]);
+        }
+    }
+    channels.add_beauty("A", options.float_beauty, |pixel| pixel.alpha);
+    if options.depth {
+        channels.add("Z".into(), |pixel| pixel.depth_m);
+    }
+    if options.sample_count {
+        channels.add("sampleCount".into(), |pixel| pixel.samples as f32);
+    }
+    let size = (buffers.width() as usize, buffers.height() as usize);
+    let channels = AnyChannels::sort(channels.list);
+    let layer = Layer::new(size, LayerAttributes::default(), Encoding::SMALL_LOSSLESS, channels);
+    let mut image = Image::from_layer(layer);
+    let text = AttributeValue::Text(Text::new_or_panic(ascii(metadata)));
+    image.layer_data.attributes.other.insert(Text::new_or_panic(METADATA), text);
+    image
+}
+
+struct Channels<'a> {
+    pixels: &'a [Pixel],
+    list: SmallVec<[AnyChannel<FlatSamples>; 4]>,
+}
+
+impl Channels<'_> {
+    fn add(&mut self, name: String, value: impl Fn(&Pixel) -> f32) {
+        let samples = FlatSamples::F32(self.pixels.iter().map(value).collect());
+        self.list.push(AnyChannel::new(name.as_str(), samples));
+    }
+
+    fn add_beauty(&mut self, name: &str, float: bool, value: impl Fn(&Pixel) -> f32) {
+        if float {
+            return self.add(name.into(), value);
+        }
+        let largest = f32::from(f16::MAX);
+        let half = |pixel| f16::from_f32(value(pixel).clamp(-largest, largest));
+        let samples = FlatSamples::F16(self.pixels.iter().map(half).collect());
+        self.list.push(AnyChannel::new(name, samples));
+    }
+}
+
+/// The same JSON with all beyond ASCII escaped: an EXR text has one byte a character.
+fn ascii(json: &str) -> String {
+    let mut text = String::with_capacity(json.len());
+    for character in json.chars() {
+        if character.is_ascii() {
+            text.push(character);
+        } else {
+            for unit in character.encode_utf16(&mut [0; 2]) {
+                text.push_str(&format!("\\u{unit:04x}"));
+            }
+        }
+    }
+    text
+}
+
+fn into_io(error: exr::error::Error) -> io::Error {
+    match error {
+        exr::error::Error::Io(error) => error,
+        other => io::Error::other(other.to_string()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use exr::prelude::{ReadChannels, ReadLayers, read};
+    use glam::Vec3;
+    use std::fs;
+
+    const ALL: ExrOptions = ExrOptions {
+        float_beauty: true,
+        depth: true,
+        normal: true,
+        albedo: true,
+        variance: true,
+        sample_count: true,
+    };
+    const NONE: ExrOptions = ExrOptions {
+        float_beauty: false,
+        depth: false,
+        normal: false,
+        albedo: false,
+        variance: false,
+        sample_count: false,
+    };
+
+    fn frame() -> RenderBuffers {
+        let mut buffers = RenderBuffers::new(37, 50);
+        for (i, pixel) in buffers.pixels_mut().iter_mut().enumerate() {
+            let x = i as f32;
+            *pixel = Pixel {
+                beauty: Vec3::new(x, 1e6, 0.3 * x),
+                alpha: 0.25,
+                depth_m: x * 0.5,
+                normal: Vec3::new(0.0, -1.0, x),
+                albedo: Vec3::new(0.1, 0.2, 0.3),
+                variance: Vec3::new(1e-9, x, 2.0),
+                samples: i as u32,
+            };
+        }
+        buffers
+    }
+
+    /// Every channel of a file by name, as floats.
+    fn channels(path: &Path) -> Vec<(String, Vec<f32>)> {
+        let layer = read().no_deep_data().largest_resolution_level().all_channels();
+        let image = layer.first_valid_layer().all_attributes().from_file(path).unwrap();
+        let list = image.layer_data.channel_data.list;
+        let named = |c: AnyChannel<FlatSamples>| {
+            (c.name.to_string(), c.sample_data.values_as_f32().collect())
+        };
+        list.into_iter().map(named).collect()
+    }
+
+    #[test]
+    fn every_buffer_comes_back_under_its_name() {
+        let folder = tempfile::tempdir().unwrap();
+        let (path, buffers) = (folder.path().join("new/f.exr"), frame());
+        write_exr(&path, &buffers, &ALL, "{}").unwrap();
+        let read = channels(&path);
+        let names: Vec<_> = read.iter().map(|channel| channel.0.as_str()).collect();
+        let expected = [
+            "A",
+            "B",
+            "G",
+            "N.X",
+            "N.Y",
+            "N.Z",
+            "R",
+            "Z",
+            "albedo.B",
+            "albedo.G",
+            "albedo.R",
+            "sampleCount",
+            "variance.B",
+            "variance.G",
+            "variance.R",
+        ];
+        assert_eq!(names, expected);
+        let value = |name: &str, i: usize| read.iter().find(|c| c.0 == name).unwrap().1[i];
+        for (i, pixel) in buffers.pixels().iter().enumerate() {
+            assert_eq!(value("R", i), pixel.beauty.x);
+            assert_eq!(value("A", i), 0.25);
+            assert_eq!(value("Z", i), pixel.depth_m);
+            assert_eq!(value("N.Z", i), pixel.normal.z);
+            assert_eq!(value("albedo.B", i), 0.3);
+            assert_eq!(value("variance.G", i), pixel.variance.y);
+            assert_eq!(value("sampleCount", i), i as f32);
+        }
+        write_exr(&path, &buffers, &NONE, "{}").unwrap();
+        let read = channels(&path);
+        assert_eq!(read.len(), 4);
+        assert_eq!(read[2].1[3], 65504.0);
+        assert!((read[3].1[1000] - 1000.0).abs() < 1.0);
+    }
+
+    #[test]
+    fn the_same_frame_is_the_same_bytes() {
+        let folder = tempfile::tempdir().unwrap();
+        let bytes = |name: &str| {
+            let path = folder.path().join(name);
+            write_exr(&path, &frame(), &ALL, r#"{"seed":1}"#).unwrap();
+            fs::read(path).unwrap()
+        };
+        let first = bytes("a.exr");
+        for name in ["b.exr", "c.exr", "d.exr"] {
+            assert_eq!(first, bytes(name));
+        }
+    }
+
+    #[test]
+    fn metadata_comes_back_from_whole_files_alone() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("f.exr");
+        let json = r#"{"scene":"straße 💡.gltf","frame":1001}"#;
+        write_exr(&path, &frame(), &ALL, json).unwrap();
+        let text = read_metadata(&path).unwrap();
+        let parse = |text: &str| serde_json::from_str::<serde_json::Value>(text).unwrap();
+        assert_eq!(parse(&text), parse(json));
+        let whole = fs::read(&path).unwrap();
+        let part = folder.path().join("part.exr");
+        for length in [0, 3, 100, whole.len() / 2, whole.len() - 100, whole.len() - 1] {
+            fs::write(&part, &whole[..length]).unwrap();
+            assert_eq!(read_metadata(&part), None, "{length} bytes of {}", whole.len());
+        }
+        fs::write(&part, vec![b'x'; 5000]).unwrap();
+        assert_eq!(read_metadata(&part), None);
+        assert_eq!(read_metadata(&folder.path().join("absent.exr")), None);
+        assert_eq!(read_metadata(folder.path()), None);
+    }
+
+    #[test]
+    fn a_file_of_another_program_has_no_metadata() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("other.exr");
+        exr::prelude::write_rgba_file(&path, 4, 4, |_, _| (0.0, 0.0, 0.0, 1.0)).unwrap();
+        assert_eq!(read_metadata(&path), None);
+    }
+}
