@@ -10,7 +10,8 @@ fn every_real_file_loads() {
     let Some(folder) = shared::folder("real") else { return };
     for file in shared::files_below(&folder) {
         let extension = file.extension().and_then(|e| e.to_str());
-        if matches!(extension, Some("gltf" | "glb" | "obj")) && !file.starts_with(folder.join("malformed"))
+        if matches!(extension, Some("gltf" | "glb" | "obj"))
+            && !file.starts_with(folder.join("malformed"))
         {
             let start = std::time::Instant::now();
             match load(&file) {

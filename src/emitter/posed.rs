@@ -23,7 +23,9 @@ pub struct PosedEmitters<'a> {
 
 /// A light that `f32` cannot hold.
 #[derive(Clone, Debug, thiserror::Error, PartialEq, Eq)]
-#[error("{path}: its position or its intensity times its area is beyond the range of numbers (3e38); scale it down")]
+#[error(
+    "{path}: its position or its intensity times its area is beyond the range of numbers (3e38); scale it down"
+)]
 pub struct LightOverflow {
     /// Prim path of the light.
     pub path: String,

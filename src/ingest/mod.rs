@@ -41,7 +41,9 @@ pub fn load(path: &Path) -> Result<Scene, IngestError> {
             .remedy("convert it to .gltf, .glb or .obj; USD with scripts/usd_to_gltf.py")),
     };
     match scene {
-        Ok(scene) => Ok(Scene { source: path.to_path_buf(), ..scene }),
+        Ok(scene) => {
+            Ok(Scene { source: path.to_path_buf(), files: vec![path.to_path_buf()], ..scene })
+        }
         Err(fault) => Err(fault.in_file(path)),
     }
 }

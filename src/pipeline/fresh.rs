@@ -75,13 +75,18 @@ pub struct StaleTree {
 impl fmt::Display for StaleTree {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "the tree is stale")?;
-        let kinds = [("added", &self.added), ("removed", &self.removed), ("dirtied", &self.dirtied)];
+        let kinds =
+            [("added", &self.added), ("removed", &self.removed), ("dirtied", &self.dirtied)];
         let (mut left, mut unnamed) = (MOST_NAMED, 0);
         for (verb, paths) in kinds.into_iter().filter(|(_, paths)| !paths.is_empty()) {
             let named = &paths[..paths.len().min(left)];
             left -= named.len();
             unnamed += paths.len() - named.len();
-            write!(f, "; {verb}: {}", if named.is_empty() { "(more)".into() } else { named.join(", ") })?;
+            write!(
+                f,
+                "; {verb}: {}",
+                if named.is_empty() { "(more)".into() } else { named.join(", ") }
+            )?;
         }
         if unnamed > 0 {
             write!(f, " and {unnamed} more")?;
@@ -114,8 +119,11 @@ pub fn check_fresh<D: AsRef<[u8]>>(
 }
 
 fn compare<D: AsRef<[u8]>>(tree: &LightTree<D>, now: &[LightSummary]) -> StaleTree {
-    let before: BTreeMap<&str, _> =
-        tree.lights().iter().map(|row| (tree.light_path(row), (row.fingerprint, row.moves))).collect();
+    let before: BTreeMap<&str, _> = tree
+        .lights()
+        .iter()
+        .map(|row| (tree.light_path(row), (row.fingerprint, row.moves)))
+        .collect();
     let after: BTreeMap<&str, _> = now
         .iter()
         .map(|light| (light.path.as_str(), (light.fingerprint, u32::from(light.moves))))

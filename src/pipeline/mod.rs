@@ -5,10 +5,14 @@
 //! which lights changed.
 
 mod build;
+mod content;
+mod frames;
 mod fresh;
 mod survey;
 
 pub use build::{BuildOptions, build_tree};
+pub use content::scene_fingerprint;
+pub use frames::frames_of;
 pub use fresh::{OpenedTree, StaleTree, TreeError, check_fresh, open_tree};
 pub use survey::{Survey, survey};
 

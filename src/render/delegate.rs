@@ -89,7 +89,11 @@ impl<'a, D: AsRef<[u8]> + Sync> RenderDelegate<'a, D> {
     ///
     /// # Errors
     /// If the tree lacks the frame, or `progress` asks to stop.
-    pub fn render(&self, frame: i32, progress: &impl Progress) -> Result<RenderedFrame, FrameError> {
+    pub fn render(
+        &self,
+        frame: i32,
+        progress: &impl Progress,
+    ) -> Result<RenderedFrame, FrameError> {
         let pose = self.scene.pose_at(self.scene.timeline.seconds_at(f64::from(frame)));
         let infinite = infinite_lights(self.scene, &pose);
         let tree = self.tree.at_frame(frame, &self.static_leaves)?;
@@ -100,12 +104,7 @@ impl<'a, D: AsRef<[u8]> + Sync> RenderDelegate<'a, D> {
             surfaces: Surfaces::new(self.scene, &pose),
             emitters: PosedEmitters { scene: self.scene, emitters: self.emitters, pose: &pose },
             infinite: &infinite,
-            picker: LightPicker::new(
-                self.settings.strategy,
-                tree,
-                self.emitters.len(),
-                &infinite,
-            ),
+            picker: LightPicker::new(self.settings.strategy, tree, self.emitters.len(), &infinite),
             camera: CameraRays::new(&self.camera, &pose, width, height),
         };
         let frame_seed = hash(self.settings.seed, frame as u32);

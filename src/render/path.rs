@@ -90,7 +90,14 @@ struct Vertex {
 
 impl Integrator<'_> {
     /// Traces one path through a pixel. `seed` stands for the pixel in its frame.
-    pub fn trace(&self, x: u32, y: u32, seed: u32, index: u32, stats: &mut TraceStats) -> PathSample {
+    pub fn trace(
+        &self,
+        x: u32,
+        y: u32,
+        seed: u32,
+        index: u32,
+        stats: &mut TraceStats,
+    ) -> PathSample {
         let mut sampler = Sampler::new(seed, index);
         let [px, py, lx, ly] = sampler.next_4d();
         let CameraRay { mut origin, mut direction } =
@@ -203,7 +210,8 @@ impl Integrator<'_> {
             None => reflected * radiance / chance,
             Some(pdf) => {
                 let density = chance * pdf;
-                let weight = if self.settings.mis { power_heuristic(density, bsdf_pdf) } else { 1.0 };
+                let weight =
+                    if self.settings.mis { power_heuristic(density, bsdf_pdf) } else { 1.0 };
                 reflected * radiance * (weight / density)
             }
         }

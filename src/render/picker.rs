@@ -173,8 +173,11 @@ impl<'a> LightPicker<'a> {
         of_tree: f64,
         in_tree: impl FnOnce(u32) -> f64,
     ) -> f64 {
-        let total =
-            if self.infinite.is_empty() { of_tree } else { of_tree + self.infinite_importance(receiver) };
+        let total = if self.infinite.is_empty() {
+            of_tree
+        } else {
+            of_tree + self.infinite_importance(receiver)
+        };
         if total <= 0.0 {
             return 0.0;
         }

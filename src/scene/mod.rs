@@ -43,6 +43,8 @@ use std::path::PathBuf;
 pub struct Scene {
     /// The file this scene was read from, for messages.
     pub source: PathBuf,
+    /// That file and every file that was read because it refers to it.
+    pub files: Vec<PathBuf>,
     /// The transform hierarchy. A parent stands before its children.
     pub nodes: Vec<Node>,
     /// Triangle meshes, one material each.

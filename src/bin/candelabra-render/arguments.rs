@@ -1,0 +1,108 @@
+//! The command line.
+
+use candelabra::render::frame_names::FrameNames;
+use candelabra::render::frames::Frames;
+use candelabra::render::{LightStrategy, RenderSettings};
+use clap::{Parser, ValueEnum};
+use std::path::PathBuf;
+
+/// Renders the frames of a shot through a light tree.
+///
+/// Exit codes: 0 done, 1 a frame or everything failed, 2 usage, 3 the tree is stale or broken.
+#[derive(Parser)]
+#[command(version, arg_required_else_help = true)]
+pub struct Arguments {
+    /// The scene: .gltf, .glb or .obj
+    pub scene: PathBuf,
+    /// Its light tree, from `candelabra build`; built in memory if not given
+    #[arg(long)]
+    pub tree: Option<PathBuf>,
+    /// Frames: 1001-1048, 1001-1048x2, 1,5,9; the first of the scene if not given
+    #[arg(short, long)]
+    pub frames: Option<Frames>,
+    /// The pictures: street.####.exr or street.%04d.exr
+    #[arg(short, long, value_parser = FrameNames::new)]
+    pub output: FrameNames,
+    /// Samples of each pixel
+    #[arg(long, default_value_t = 64, value_parser = clap::value_parser!(u32).range(1..))]
+    pub spp: u32,
+    /// Bounces of light to the eye: 0 shows emitters only, 1 adds direct light
+    #[arg(long, default_value_t = 5)]
+    pub depth: u32,
+    /// Size of the picture in pixels, WxH; 720 high in the camera's shape if not given
+    #[arg(long, value_parser = resolution)]
+    pub res: Option<(u32, u32)>,
+    /// Camera, by prim path or number; the first if not given
+    #[arg(long)]
+    pub camera: Option<String>,
+    /// Another seed, another noise
+    #[arg(long, default_value_t = 0)]
+    pub seed: u32,
+    /// Threads; as many as there are cores if not given
+    #[arg(long)]
+    pub threads: Option<usize>,
+    /// How lights are picked
+    #[arg(long, value_enum, default_value_t = Strategy::Tree)]
+    pub light_sampler: Strategy,
+    /// Write a PNG beside each picture
+    #[arg(long)]
+    pub png: bool,
+    /// Beauty in 32-bit floats instead of 16
+    #[arg(long)]
+    pub float: bool,
+    /// Skip frames that are there, whole, and rendered from the same scene, tree and settings
+    #[arg(long)]
+    pub resume: bool,
+    /// Do not prove that the tree file is sound before using it
+    #[arg(long)]
+    pub no_verify: bool,
+}
+
+/// How lights are picked.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Strategy {
+    /// Every light alike
+    Uniform,
+    /// By energy, the same everywhere
+    Power,
+    /// By importance, through the light tree
+    Tree,
+    /// By the importance of every emitter: the ideal, slow
+    Exhaustive,
+}
+
+/// The largest width and height: the picture must fit into memory and into an EXR.
+const LARGEST: u32 = 1 << 16;
+
+fn resolution(text: &str) -> Result<(u32, u32), String> {
+    let sides = text.split_once(['x', 'X']);
+    let parsed = sides.and_then(|(w, h)| Some((w.parse().ok()?, h.parse().ok()?)));
+    match parsed {
+        Some((w, h)) if (1..=LARGEST).contains(&w) && (1..=LARGEST).contains(&h) => Ok((w, h)),
+        _ => Err(format!("write WIDTHxHEIGHT, such as 1280x720, each from 1 to {LARGEST}")),
+    }
+}
+
+impl Arguments {
+    /// The knobs, for a camera of some aspect.
+    pub fn settings(&self, aspect: Option<f32>) -> RenderSettings {
+        let (width, height) = self.res.unwrap_or_else(|| {
+            let wide = 720.0 * aspect.unwrap_or(16.0 / 9.0);
+            ((wide.round() as u32).clamp(1, LARGEST), 720)
+        });
+        RenderSettings {
+            width,
+            height,
+            samples: self.spp,
+            depth: self.depth,
+            seed: self.seed,
+            strategy: match self.light_sampler {
+                Strategy::Uniform => LightStrategy::Uniform,
+                Strategy::Power => LightStrategy::Power,
+                Strategy::Tree => LightStrategy::Tree,
+                Strategy::Exhaustive => LightStrategy::Exhaustive,
+            },
+            mis: true,
+        }
+    }
+}

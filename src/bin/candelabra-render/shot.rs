@@ -1,0 +1,194 @@
+//! A shot: prepared once, then frame after frame.
+
+use crate::arguments::Arguments;
+use crate::progress::Bar;
+use anyhow::{Context, Result, anyhow, bail};
+use candelabra::emitter::Emitters;
+use candelabra::light_tree::LightTree;
+use candelabra::pipeline::{self, BuildOptions};
+use candelabra::render::exr::{ExrOptions, read_metadata, write_exr};
+use candelabra::render::frames::Frames;
+use candelabra::render::png::{exposure_for, write_png};
+use candelabra::render::{FrameError, RenderDelegate, RenderSettings};
+use candelabra::scene::{Camera, Scene};
+use serde::{Deserialize, Serialize};
+use std::path::Path;
+use std::str::FromStr;
+use std::time::Instant;
+
+/// Renders what the arguments ask for and returns how many frames failed.
+pub fn render(arguments: &Arguments) -> Result<usize> {
+    if let Some(threads) = arguments.threads {
+        rayon::ThreadPoolBuilder::new().num_threads(threads).build_global()?;
+    }
+    let scene = pipeline::load_scene(&arguments.scene)?;
+    for note in &scene.notes {
+        eprintln!("note: {note}");
+    }
+    let frames = match &arguments.frames {
+        Some(frames) => frames.clone(),
+        None => Frames::from_str(&pipeline::frames_of(&scene)[0].to_string())?,
+    };
+    arguments.output.check(&frames)?;
+    let camera = find_camera(&scene, arguments.camera.as_deref())?;
+    let emitters = Emitters::collect(&scene);
+    match &arguments.tree {
+        Some(path) => {
+            let tree = pipeline::open_tree(path, !arguments.no_verify)?;
+            pipeline::check_fresh(&tree, path, &scene, &emitters)?;
+            render_frames(arguments, &scene, &emitters, &tree, camera, &frames)
+        }
+        None => {
+            let mut ascending = frames.as_slice().to_vec();
+            ascending.sort_unstable();
+            let survey = pipeline::survey(&scene, &emitters, &ascending)?;
+            let bytes = pipeline::build_tree(&survey, &BuildOptions::default());
+            let tree = LightTree::open(bytes)?;
+            render_frames(arguments, &scene, &emitters, &tree, camera, &frames)
+        }
+    }
+}
+
+fn find_camera(scene: &Scene, wanted: Option<&str>) -> Result<Camera> {
+    let path_of = |camera: &Camera| scene.nodes[camera.node as usize].path.clone();
+    let found = match wanted {
+        None => scene.cameras.first(),
+        Some(name) => scene
+            .cameras
+            .iter()
+            .find(|camera| path_of(camera) == name)
+            .or_else(|| name.parse::<usize>().ok().and_then(|number| scene.cameras.get(number))),
+    };
+    found.cloned().ok_or_else(|| {
+        let source = scene.source.display();
+        let all: Vec<_> = scene.cameras.iter().map(path_of).collect();
+        match wanted {
+            _ if all.is_empty() => anyhow!("{source}: the scene has no camera; add one to it"),
+            None => anyhow!("{source}: no camera"),
+            Some(name) => anyhow!("{source}: no camera '{name}'; it has {}", all.join(", ")),
+        }
+    })
+}
+
+/// What a picture was rendered from, kept in its metadata.
+#[derive(Serialize, Deserialize)]
+struct Stamp {
+    software: String,
+    frame: i32,
+    fingerprint: String,
+    settings: serde_json::Value,
+}
+
+const SOFTWARE: &str = concat!("candelabra-render ", env!("CARGO_PKG_VERSION"));
+
+impl Stamp {
+    /// Over everything that the pixels depend on.
+    fn new(
+        scene_fingerprint: &[u8; 32],
+        tree_fingerprint: &[u8; 32],
+        camera: &Camera,
+        arguments: &Arguments,
+        settings: &RenderSettings,
+        frame: i32,
+    ) -> Result<Stamp> {
+        let settings = serde_json::to_value(settings)?;
+        let mut hasher = blake3::Hasher::new();
+        hasher.update(scene_fingerprint).update(tree_fingerprint);
+        let rest = format!("{SOFTWARE} {camera:?} {} {settings} {frame}", arguments.float);
+        hasher.update(rest.as_bytes());
+        let fingerprint = hasher.finalize().to_hex().to_string();
+        Ok(Stamp { software: SOFTWARE.into(), frame, fingerprint, settings })
+    }
+
+    /// Whether a picture is there, whole, and rendered from the same.
+    fn is_on(&self, path: &Path) -> bool {
+        let metadata = read_metadata(path);
+        let stamp = metadata.and_then(|text| serde_json::from_str::<Stamp>(&text).ok());
+        stamp.is_some_and(|stamp| stamp.fingerprint == self.fingerprint)
+    }
+}
+
+fn render_frames<D: AsRef<[u8]> + Sync>(
+    arguments: &Arguments,
+    scene: &Scene,
+    emitters: &Emitters,
+    tree: &LightTree<D>,
+    camera: Camera,
+    frames: &Frames,
+) -> Result<usize> {
+    let settings = arguments.settings(camera.aspect);
+    let scene_fingerprint = pipeline::scene_fingerprint(scene)?;
+    let stamp_of = |frame| {
+        let tree = tree.fingerprint();
+        Stamp::new(&scene_fingerprint, &tree, &camera, arguments, &settings, frame)
+    };
+    let height = settings.height;
+    let bar = Bar::new(frames.as_slice().len(), height);
+    // Prepared when the first frame needs it: a finished shot resumes at once.
+    let mut delegate = None;
+    let (mut failed, mut exposure) = (0, None);
+    for &frame in frames.as_slice() {
+        let path = arguments.output.path(frame);
+        let stamp = stamp_of(frame)?;
+        if arguments.resume && stamp.is_on(&path) {
+            bar.line(&format!("frame {frame}: {} is up to date", path.display()));
+            bar.skip(height);
+            continue;
+        }
+        bar.frame(frame);
+        let delegate = delegate.get_or_insert_with(|| {
+            RenderDelegate::new(scene, emitters, tree, camera.clone(), settings.clone())
+        });
+        match render_frame(delegate, arguments, &stamp, &path, &bar, &mut exposure) {
+            Ok(line) => bar.line(&line),
+            Err(error) => {
+                failed += 1;
+                bar.line(&format!("frame {frame}: failed: {error:#}"));
+            }
+        }
+    }
+    Ok(failed)
+}
+
+/// Renders and writes one frame; returns the line that tells what was done.
+fn render_frame<D: AsRef<[u8]> + Sync>(
+    delegate: &RenderDelegate<D>,
+    arguments: &Arguments,
+    stamp: &Stamp,
+    path: &Path,
+    bar: &Bar,
+    exposure: &mut Option<f32>,
+) -> Result<String> {
+    let started = Instant::now();
+    let rendered = match delegate.render(stamp.frame, bar) {
+        Ok(rendered) => rendered,
+        Err(error @ FrameError::NoSuchFrame(_)) => return Err(error.into()),
+        Err(FrameError::Interrupted) => bail!("interrupted"),
+    };
+    let seconds = started.elapsed().as_secs_f64();
+    let options = ExrOptions {
+        float_beauty: arguments.float,
+        depth: true,
+        normal: true,
+        albedo: true,
+        variance: true,
+        sample_count: true,
+    };
+    let metadata = serde_json::to_string(stamp)?;
+    write_exr(path, &rendered.buffers, &options, &metadata)
+        .with_context(|| "writing the picture")?;
+    if arguments.png {
+        // One exposure for the shot, or the previews would flicker.
+        let stops = *exposure.get_or_insert_with(|| exposure_for(&rendered.buffers));
+        write_png(&path.with_extension("png"), &rendered.buffers, stops)
+            .with_context(|| "writing the preview")?;
+    }
+    let stats = rendered.stats;
+    Ok(format!(
+        "frame {}: {seconds:.2} s, {:.2} million rays a second, {} light picks -> {}",
+        stamp.frame,
+        stats.rays as f64 / seconds / 1e6,
+        stats.light_picks,
+        path.display()
+    ))
+}

@@ -1,0 +1,122 @@
+//! `candelabra build`: a scene in, a tree file out.
+
+use anyhow::{Context, Result};
+use candelabra::emitter::Emitters;
+use candelabra::pipeline::{self, BuildOptions, Survey};
+use candelabra::render::frames::Frames;
+use candelabra::store::write_atomically;
+use clap::Args;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+#[derive(Args)]
+pub struct Arguments {
+    /// The scene: .gltf, .glb or .obj
+    scene: PathBuf,
+    /// The tree file to write; the scene's name with .ltree if not given
+    #[arg(short, long)]
+    output: Option<PathBuf>,
+    /// Frames to build for, if lights move: 1001-1048, 1001-1048x2, 1,5,9; the scene's own if not
+    /// given
+    #[arg(long)]
+    frames: Option<Frames>,
+    /// Threads; as many as there are cores if not given
+    #[arg(long)]
+    threads: Option<usize>,
+    /// Build even if the output is up to date
+    #[arg(long)]
+    force: bool,
+}
+
+pub fn run(arguments: &Arguments) -> Result<()> {
+    if let Some(threads) = arguments.threads {
+        rayon::ThreadPoolBuilder::new().num_threads(threads).build_global()?;
+    }
+    let output = arguments.output.clone().unwrap_or(arguments.scene.with_extension("ltree"));
+    let mut out = std::io::stdout().lock();
+
+    let started = Instant::now();
+    let scene = pipeline::load_scene(&arguments.scene)?;
+    for note in &scene.notes {
+        eprintln!("note: {note}");
+    }
+    let loaded = started.elapsed();
+    let emitters = Emitters::collect(&scene);
+    let frames = match &arguments.frames {
+        Some(frames) => {
+            let mut frames = frames.as_slice().to_vec();
+            frames.sort_unstable();
+            frames
+        }
+        None => pipeline::frames_of(&scene),
+    };
+    let survey = pipeline::survey(&scene, &emitters, &frames)
+        .with_context(|| arguments.scene.display().to_string())?;
+    writeln!(
+        out,
+        "{}: {} lights, {} emitters ({} move), read in {}",
+        arguments.scene.display(),
+        survey.lights.len(),
+        emitters.len(),
+        emitters.len() - emitters.static_count(),
+        Seconds(loaded),
+    )?;
+    if !arguments.force && is_up_to_date(&output, &survey) {
+        writeln!(out, "{}: up to date", output.display())?;
+        return Ok(());
+    }
+
+    let started = Instant::now();
+    let options =
+        BuildOptions { program: concat!("candelabra ", env!("CARGO_PKG_VERSION")).into() };
+    let bytes = pipeline::build_tree(&survey, &options);
+    let built = started.elapsed();
+    write_atomically(&output, |file| file.write_all(bytes.as_ref()))?;
+
+    let started = Instant::now();
+    pipeline::open_tree(&output, true)?;
+    let opened = started.elapsed();
+    report(&mut out, &output, bytes.as_ref().len(), emitters.len(), built, opened)?;
+    Ok(())
+}
+
+/// Whether the output is a sound tree of just this content.
+fn is_up_to_date(output: &Path, survey: &Survey) -> bool {
+    pipeline::open_tree(output, true).is_ok_and(|tree| tree.fingerprint() == survey.fingerprint)
+}
+
+fn report(
+    out: &mut impl Write,
+    output: &Path,
+    bytes: usize,
+    emitters: usize,
+    built: Duration,
+    opened: Duration,
+) -> Result<()> {
+    let each = bytes as f64 / emitters.max(1) as f64;
+    writeln!(out, "{}: {bytes} bytes, {each:.1} an emitter", output.display())?;
+    let (build, open) = (built.as_secs_f64(), opened.as_secs_f64());
+    write!(out, "built in {}, opens and verifies in {}: ", Seconds(built), Seconds(opened))?;
+    if build > open {
+        let renders = (build / (build - open)).ceil().max(2.0);
+        writeln!(out, "the file has paid for itself when {renders:.0} processes have used it")?;
+    } else {
+        writeln!(out, "building anew is as fast as opening; the file pays as a record")?;
+    }
+    Ok(())
+}
+
+/// A duration with three digits.
+struct Seconds(Duration);
+
+impl std::fmt::Display for Seconds {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let seconds = self.0.as_secs_f64();
+        if seconds < 0.1 {
+            write!(f, "{:.2} ms", seconds * 1e3)
+        } else {
+            write!(f, "{seconds:.2} s")
+        }
+    }
+}

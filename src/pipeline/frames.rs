@@ -1,0 +1,23 @@
+//! Which frames a shot has, where nobody says.
+
+use crate::scene::{Channel, Scene};
+
+/// The frames of a scene's own timeline: from its first to its last, or to the last animation key
+/// if the file names no last frame. A scene that stands still has one.
+pub fn frames_of(scene: &Scene) -> Vec<i32> {
+    let timeline = &scene.timeline;
+    let last_key = || {
+        let channels = scene.nodes.iter().flat_map(|node| &node.channels);
+        let seconds = channels.map(|channel| match channel {
+            Channel::Translation(keys) | Channel::Scale(keys) => keys.times_s.last(),
+            Channel::Rotation(keys) => keys.times_s.last(),
+        });
+        let last_s = seconds.flatten().fold(0f32, |last, &key| last.max(key));
+        timeline.first_frame + f64::from(last_s) * timeline.frames_per_second
+    };
+    let last = timeline.last_frame.unwrap_or_else(last_key);
+    let first = timeline.first_frame.round() as i32;
+    // A clock that runs for years is a slip of the exporter; let the user say what is meant.
+    let last = (last.ceil() as i32).clamp(first, first.saturating_add(100_000));
+    (first..=last).collect()
+}
