@@ -16,6 +16,8 @@ from .materials import Look
 from .report import Report
 from .textures import TextureRead, Textures
 
+_OTHER_CONTEXTS = ("mtlx", "arnold", "ri", "mdl", "glslfx")
+"""Render contexts whose shaders are named in the report."""
 _ONE, _ZERO = (1.0,) * 4, (0.0,) * 4
 
 
@@ -40,9 +42,11 @@ class PreviewSurfaces:
         shader, _, _ = material.ComputeSurfaceSource()
         name = str(shader.GetIdAttr().Get() or "") if shader else ""
         if name != "UsdPreviewSurface":
-            if not shader:
-                shader, _, _ = material.ComputeSurfaceSource(["arnold", "mtlx", "ri", "mdl", "glslfx"])
-                name = str(shader.GetIdAttr().Get() or "") if shader else ""
+            for context in _OTHER_CONTEXTS if not shader else ():
+                shader, _, _ = material.ComputeSurfaceSource(context)
+                if shader:
+                    name = str(shader.GetIdAttr().Get() or "")
+                    break
             what = f"surface shader {name}" if name else "material without a surface shader"
             self.report.warn(path, what, "only UsdPreviewSurface is read; display colour or grey is used")
             return Look(path=str(path))
