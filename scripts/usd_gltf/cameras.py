@@ -12,9 +12,13 @@ from pxr import Usd, UsdGeom
 
 from .gltf_document import number
 from .report import Report
-from .stage import Frames
+from .stage import Frames, changes
 
 _TENTH = 0.1
+_READ = (
+    "projection", "horizontalAperture", "verticalAperture", "horizontalApertureOffset",
+    "verticalApertureOffset", "focalLength", "fStop", "focusDistance", "clippingRange",
+)  # fmt: skip
 
 
 def read_camera(
@@ -25,11 +29,8 @@ def read_camera(
     path = prim.GetPath()
     for attribute in prim.GetAuthoredAttributes():
         name = attribute.GetName()
-        known = not name.startswith(("xformOp", "visibility", "shutter"))
-        if known and ":" not in name and attribute.GetNumTimeSamples() > 1:
-            values = [attribute.Get(code) for code in frames.codes]
-            if any(value != values[0] for value in values):
-                report.warn(path, f"animated camera {name}", "the first frame's value is used")
+        if name in _READ and changes(attribute, frames):
+            report.warn(path, f"animated camera {name}", "the first frame's value is used")
 
     def get(attribute: Usd.Attribute) -> float:
         value = attribute.Get(frames.first)

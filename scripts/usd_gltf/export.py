@@ -43,7 +43,7 @@ def export(source: Path, output: Path, options: Options, fingerprint: str) -> Ex
 
     document = Document(output)
     textures = Textures(document, frames.first, report)
-    materials = Materials(document, PreviewSurfaces(textures, frames.first, report).read, report)
+    materials = Materials(document, PreviewSurfaces(textures, frames, report).read, report)
     meshes = MeshReader(document, materials, frames, report)
     tree = PrimTree(stage, meshes, frames, options.purposes, meters_per_unit, report)
     carriers = LightCarriers(

@@ -15,7 +15,7 @@ import numpy as np
 from pxr import Gf, Sdf, Usd, UsdLux
 
 from .report import Report
-from .stage import Frames
+from .stage import Frames, changes
 
 SIZES = {
     "RectLight": ("width", "height"),
@@ -115,10 +115,8 @@ class _Reader:
     def at_first(self, name: str):
         """Value at the first frame; a value that varies is reported."""
         attribute = self.prim.GetAttribute(f"inputs:{name}")
-        if attribute and attribute.ValueMightBeTimeVarying() and len(self.frames.codes) > 1:
-            values = [attribute.Get(code) for code in self.frames.codes]
-            if any(value != values[0] for value in values):
-                self.report.warn(self.prim.GetPath(), f"animated inputs:{name}", "the first frame's value is used")
+        if changes(attribute, self.frames):
+            self.report.warn(self.prim.GetPath(), f"animated inputs:{name}", "the first frame's value is used")
         return self.at(name, self.frames.first)
 
     def size(self, name: str) -> float:
@@ -171,7 +169,7 @@ class _Reader:
         def value(name: str, fallback):
             attribute = prim.GetAttribute(f"inputs:shaping:{name}")
             found = attribute.Get(self.frames.first) if attribute else None
-            if attribute and attribute.GetNumTimeSamples() > 1:
+            if changes(attribute, self.frames):
                 self.report.warn(prim.GetPath(), f"animated inputs:shaping:{name}", "the first frame's value is used")
             return fallback if found is None else found
 

@@ -11,6 +11,7 @@ Flat shapes face -Z, cylinders run along X without caps, spheres and cylinders f
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -30,34 +31,47 @@ class Tessellation:
     triangles: np.ndarray
 
 
-def cofactor(linear: np.ndarray) -> np.ndarray:
-    """The cofactor matrix, which maps area vectors: cof(M) (a x b) = (M a) x (M b)."""
-    a, b, c = linear[:, 0], linear[:, 1], linear[:, 2]
-    return np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)], axis=1)
-
-
 def world_area(kind: str, size: dict[str, float], linear: np.ndarray) -> float:
     """Area in the units of `linear`'s target space of the light's shape under `linear` (3x3)."""
-    cof = cofactor(linear)
+    # The area depends on M only through G = M^T M, since |cof(M) n|^2 = n^T cof(G) n. Pulling the
+    # overall scale out leaves few different shapes however many instances there are.
+    gram = linear.T @ linear
+    scale = float(np.trace(gram)) / 3
+    if not scale > 0.0:
+        return 0.0
+    shape = tuple(round(g, 12) for g in (gram / scale).reshape(-1).tolist())
+    return _unit_area(kind, tuple(sorted(size.items())), shape) * scale
+
+
+@lru_cache(maxsize=100_000)
+def _unit_area(kind: str, sizes: tuple[tuple[str, float], ...], shape: tuple[float, ...]) -> float:
+    """Area of the light under any transform M with M^T M = `shape`."""
+    size = dict(sizes)
+    a, b, c = np.array(shape).reshape(3, 3)
+    stretch = np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)])
     if kind == "RectLight":
-        return size["width"] * size["height"] * float(np.linalg.norm(cof[:, 2]))
+        return size["width"] * size["height"] * float(np.sqrt(max(stretch[2, 2], 0.0)))
     if kind == "DiskLight":
-        return np.pi * size["radius"] ** 2 * float(np.linalg.norm(cof[:, 2]))
+        return np.pi * size["radius"] ** 2 * float(np.sqrt(max(stretch[2, 2], 0.0)))
     if kind == "CylinderLight":
         angle = np.arange(256) * (2 * np.pi / 256)
-        normals = np.stack([np.zeros_like(angle), np.cos(angle), np.sin(angle)])
-        mean = float(np.linalg.norm(cof @ normals, axis=0).mean())
-        return 2 * np.pi * size["radius"] * size["length"] * mean
+        normals = np.stack([np.zeros_like(angle), np.cos(angle), np.sin(angle)], axis=1)
+        return 2 * np.pi * size["radius"] * size["length"] * float(_stretched(normals, stretch).mean())
     if kind == "SphereLight":
         height, weight = np.polynomial.legendre.leggauss(64)
         angle = np.arange(128) * (2 * np.pi / 128)
         ring = np.sqrt(1 - height**2)
         normals = np.stack(
-            [np.outer(ring, np.cos(angle)), np.outer(ring, np.sin(angle)), np.outer(height, np.ones_like(angle))]
+            [np.outer(ring, np.cos(angle)), np.outer(ring, np.sin(angle)), np.outer(height, np.ones_like(angle))],
+            axis=2,
         )
-        lengths = np.linalg.norm(np.einsum("ij,jkl->ikl", cof, normals), axis=0).mean(axis=1)
-        return 2 * np.pi * size["radius"] ** 2 * float(lengths @ weight)
+        return 2 * np.pi * size["radius"] ** 2 * float(_stretched(normals, stretch).mean(axis=1) @ weight)
     raise ValueError(kind)
+
+
+def _stretched(normals: np.ndarray, stretch: np.ndarray) -> np.ndarray:
+    """|cof(M) n| for each normal, from cof(M^T M)."""
+    return np.sqrt(np.maximum(np.einsum("...i,ij,...j->...", normals, stretch, normals), 0.0))
 
 
 def tessellate(kind: str, size: dict[str, float]) -> Tessellation:

@@ -70,20 +70,11 @@ class Materials:
             self._looks[key] = self.read_surface(material)
         return self._looks[key]
 
-    def index(
-        self,
-        look: Look,
-        double_sided: bool,
-        tint: tuple[float, float, float, float] | None,
-        emission: Emission | None = None,
-    ) -> int:
-        """The glTF material of a look on a mesh; `emission` replaces its own glow."""
-        color, mode = look.base_color, look.alpha_mode
-        if look.uses_display_color and tint is not None:
-            color = tint
-            if tint[3] < 1.0:
-                mode = "BLEND"
-                color = tint if tint[:3] != (1.0, 1.0, 1.0) else (1.0, 1.0, 1.0, 1.0)
+    def index(self, piece, emission: Emission | None = None) -> int:
+        """The glTF material of a `mesh.Piece`; `emission` replaces its look's own glow."""
+        look = piece.look
+        color = look.base_color if piece.tint is None else piece.tint
+        mode = "BLEND" if piece.translucent and look.alpha_mode == "OPAQUE" else look.alpha_mode
         surface: dict = {
             "baseColorFactor": numbers(np.clip(color, 0.0, 1.0)),
             "metallicFactor": number(look.metallic),
@@ -109,7 +100,7 @@ class Materials:
             for extension in look.extensions:
                 self.document.use(extension)
         emission = emission or Emission(np.array(look.emission), look.emission_texture)
-        return self._emitting(material, emission, double_sided)
+        return self._emitting(material, emission, piece.double_sided)
 
     def light_material(self, emission: Emission, double_sided: bool = False) -> int:
         """A black material that only emits."""

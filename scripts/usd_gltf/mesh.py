@@ -21,7 +21,7 @@ from .light_inputs import Light
 from .materials import Emission, Look, Materials
 from .primvars import CornerValues, read_normals, read_primvar
 from .report import Report
-from .stage import Frames
+from .stage import Frames, changes
 from .triangulate import triangulate
 
 GLOW = "materialGlowTintsLight"
@@ -43,6 +43,9 @@ class Piece:
     look: Look
     double_sided: bool
     tint: tuple[float, float, float, float] | None
+    """A display colour for the whole piece; one that varies is in `COLOR_0`."""
+    translucent: bool
+    """Whether a display opacity is below 1."""
 
 
 @dataclass
@@ -63,10 +66,7 @@ class MeshSource:
 
     def primitives(self, materials: Materials) -> list[dict]:
         """glTF primitives of a mesh that is no light."""
-        return [
-            {**piece.primitive, "material": materials.index(piece.look, piece.double_sided, piece.tint)}
-            for piece in self.pieces
-        ]
+        return [{**piece.primitive, "material": materials.index(piece)} for piece in self.pieces]
 
     def pieces_lit(self, material_sync: str) -> list[Glow]:
         """How each piece glows under `light:materialSyncMode`."""
@@ -93,7 +93,7 @@ class MeshSource:
                 if light.material_sync == "independent" and any(piece.look.emission):
                     why = "the eye is to see the material's own glow; it sees the light's"
                     materials.report.warn(light.path, "materialSyncMode = independent", why)
-                index = materials.index(piece.look, piece.double_sided, piece.tint, emission)
+                index = materials.index(piece, emission)
             primitives.append({**piece.primitive, "material": index})
         return primitives
 
@@ -103,7 +103,7 @@ class MeshReader:
 
     def __init__(self, document: Document, materials: Materials, frames: Frames, report: Report) -> None:
         self.document, self.materials = document, materials
-        self.code, self.report = frames.first, report
+        self.frames, self.code, self.report = frames, frames.first, report
         self._read: dict[tuple, MeshSource | None] = {}
 
     def read(self, prim: Usd.Prim) -> MeshSource | None:
@@ -181,7 +181,7 @@ class MeshReader:
             "faceVertexIndices": mesh.GetFaceVertexIndicesAttr(),
         }
         for name, attribute in attributes.items():
-            if attribute.GetNumTimeSamples() > 1:
+            if changes(attribute, self.frames):
                 self.report.warn(path, f"animated {name}", "deforming meshes have no carrier; the first frame is used")
         raw = [attribute.Get(self.code) for attribute in attributes.values()]
         if any(value is None or len(value) == 0 for value in raw):
@@ -240,16 +240,17 @@ class MeshReader:
                 self.report.warn(prim.GetPath(), "mesh without the texture coordinates of its material", why)
                 uv = CornerValues(np.zeros((1, 2)), np.zeros(len(corners), int))
             values[f"TEXCOORD_{number}"] = CornerValues(uv.values * [1, -1] + [0, 1], uv.index)
-        tint = None
-        if look.uses_display_color:
-            color = self._display_color(prim, counts, corners)
-            if color is not None and color.constant:
-                tint = tuple(color.values[color.index[0]].tolist()) if len(color.index) else None
-            elif color is not None:
+        tint, translucent = None, False
+        color = self._display_color(prim, counts, corners) if look.uses_display_color else None
+        if color is not None:
+            translucent = bool((color.values[:, 3] < 1.0).any())
+            if color.constant:
+                tint = tuple(color.values[color.index[0]].tolist())
+            else:
+                tint = (1.0, 1.0, 1.0, 1.0)
                 values["COLOR_0"] = color
-                tint = (1.0, 1.0, 1.0, float(color.values[:, 3].min()))
         primitive = self._primitive(points, corners, values, triangles)
-        return Piece(primitive, look, double_sided, tint)
+        return Piece(primitive, look, double_sided, tint, translucent)
 
     def _display_color(self, prim: Usd.Prim, counts: np.ndarray, corners: np.ndarray) -> CornerValues | None:
         """displayColor and displayOpacity as linear RGBA."""

@@ -36,20 +36,27 @@ class NodeWriter:
         self.document, self.materials, self.carriers = document, materials, carriers
         self.frames, self.report = frames, report
         self._meshes: dict[int, int] = {}
+        self._still: dict[int, tuple[dict, dict | None]] = {}
         self._top: list[int] = []
 
     def write(self, prims: list[Prim], root: dict) -> None:
         """Write all prims under the node `root`."""
         index = self.document.node(root)
-        self._top = [self._prim(prim, prim.path, np.eye(4)) for prim in prims] + self._top
-        if self._top:
-            root["children"] = self._top
+        children = [self._prim(prim, prim.path, np.eye(4)) for prim in prims]
+        children = [child for child in children if child >= 0] + self._top
+        if children:
+            root["children"] = children
         self.document.roots = [index]
 
     def _prim(self, prim: Prim, path: str, above: np.ndarray) -> int:
         """The node of a prim that stands under the world matrices `above`."""
         world = (prim.local if prim.resets else above @ prim.local) if prim.lit else above
-        node, outer = self._placed(path, prim.name, prim.local)
+        if prim.local.ndim == 3:
+            node, outer = self._moving(path, prim.name, prim.local)
+        else:
+            if id(prim) not in self._still:
+                self._still[id(prim)] = _still(prim.local)
+            node, outer = self._placed(path, prim.name, *self._still[id(prim)])
         self._fill(node, prim, path, world)
         if not prim.resets:
             return outer
@@ -89,61 +96,62 @@ class NodeWriter:
         nodes = []
         for position, number in enumerate(placements.numbers):
             name = f"{path}[{number}]"
+            matrix = matrices[:, position] if moving else matrices[position]
             if moving:
-                matrix = matrices[:, position]
-                node, outer = self._placed(name, prototype.name, matrix)
+                node, outer = self._moving(name, prototype.name, matrix)
             elif static[3][position] > SHEAR_TOLERANCE:
-                matrix = matrices[position]
-                node, outer = self._placed(name, prototype.name, matrix)
+                node, outer = self._placed(name, prototype.name, *_still(matrix))
             else:
-                matrix = matrices[position]
-                node = _node(name, prototype.name)
-                _set(node, *(part[position] for part in static[:3]))
-                outer = self.document.node(node)
+                place = _place(*(part[position] for part in static[:3]))
+                node, outer = self._placed(name, prototype.name, place, None)
             self._fill(node, prototype, name, world @ matrix if prototype.lit else world)
             nodes.append(outer)
         return nodes
 
-    def _placed(self, path: str, name: str, local: np.ndarray) -> tuple[dict, int]:
-        """A node at `local` and the index of the node to hang under the parent.
+    def _placed(self, path: str, name: str, place: dict, outside: dict | None) -> tuple[dict, int]:
+        """A node that stands still, and the index of the node to hang under the parent."""
+        node = {"name": name, "extras": {"usdPath": path}, **place}
+        index = self.document.node(node)
+        if outside is None:
+            return node, index
+        return node, self.document.node({"name": f"{name}_shear", "children": [index], **outside})
 
-        The two differ where a matrix has shear, which one node cannot hold: two can.
-        """
-        node = _node(path, name)
-        stack = local.reshape(-1, 4, 4)
-        translation, rotation, scale, shear = decompose(stack)
-        moves = local.ndim == 3
-        if shear.max() > SHEAR_TOLERANCE and not moves:
-            outer_matrix, inner_matrix = split_shear(local)
-            _set(node, *(part[0] for part in decompose(inner_matrix[None])[:3]))
-            inner = self.document.node(node)
-            outer: dict = {"name": f"{name}_shear", "children": [inner]}
-            _set(outer, *(part[0] for part in decompose(outer_matrix[None])[:3]))
-            return node, self.document.node(outer)
+    def _moving(self, path: str, name: str, local: np.ndarray) -> tuple[dict, int]:
+        """A node that follows `local` (frames, 4, 4), and its index."""
+        translation, rotation, scale, shear = decompose(local)
         if shear.max() > SHEAR_TOLERANCE:
             why = "translation, rotation and scale cannot hold it over time; the nearest ones are used"
             self.report.warn(path, "animated shear", why)
-        _set(node, translation[0], rotation[0], scale[0])
+        node = {"name": name, "extras": {"usdPath": path}, **_place(translation[0], rotation[0], scale[0])}
         index = self.document.node(node)
-        if moves:
-            tracks = {"translation": translation, "rotation": rotation, "scale": scale}
-            for key, values in tracks.items():
-                if varies(values):
-                    node.setdefault(key, list(_DEFAULTS[key]))
-            self.report.count("animation channels", animate(self.document, index, self.frames.seconds, tracks))
+        tracks = {"translation": translation, "rotation": rotation, "scale": scale}
+        for key, values in tracks.items():
+            if varies(values):
+                node.setdefault(key, list(_DEFAULTS[key]))
+        self.report.count("animation channels", animate(self.document, index, self.frames.seconds, tracks))
         return node, index
 
 
-def _node(path: str, name: str) -> dict:
-    return {"name": name, "extras": {"usdPath": path}}
+def _still(local: np.ndarray) -> tuple[dict, dict | None]:
+    """Node properties that hold a matrix; a second set, for a node around it, if it has shear.
+
+    One node cannot hold shear, but two can: a rotated scale around a rotation.
+    """
+    translation, rotation, scale, shear = decompose(local[None])
+    if shear[0] <= SHEAR_TOLERANCE:
+        return _place(translation[0], rotation[0], scale[0]), None
+    outer, inner = (decompose(matrix[None]) for matrix in split_shear(local))
+    return _place(*(part[0] for part in inner[:3])), _place(*(part[0] for part in outer[:3]))
 
 
-def _set(node: dict, translation: np.ndarray, rotation: np.ndarray, scale: np.ndarray) -> None:
-    """Write what differs from glTF's defaults."""
+def _place(translation: np.ndarray, rotation: np.ndarray, scale: np.ndarray) -> dict:
+    """What differs from glTF's defaults."""
+    place = {}
     for key, value in (("translation", translation), ("rotation", rotation), ("scale", scale)):
         rounded = numbers(value)
         if rounded != _DEFAULTS[key]:
-            node[key] = rounded
+            place[key] = rounded
+    return place
 
 
 def root_node(meters_per_unit: float, z_up: bool) -> dict:

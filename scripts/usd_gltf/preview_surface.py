@@ -14,6 +14,7 @@ from pxr import Sdf, UsdShade
 from .gltf_document import number, numbers
 from .materials import Look
 from .report import Report
+from .stage import Frames, changes
 from .textures import TextureRead, Textures
 
 _OTHER_CONTEXTS = ("mtlx", "arnold", "ri", "mdl", "glslfx")
@@ -33,8 +34,9 @@ class Value:
 class PreviewSurfaces:
     """Reads materials; `Materials` keeps the looks."""
 
-    def __init__(self, textures: Textures, code: float, report: Report) -> None:
-        self.textures, self.code, self.report = textures, code, report
+    def __init__(self, textures: Textures, frames: Frames, report: Report) -> None:
+        self.textures, self.frames, self.report = textures, frames, report
+        self.code = frames.first
 
     def read(self, material: UsdShade.Material) -> Look:
         """The look of a material; unknown shaders are reported and look like no material."""
@@ -207,7 +209,7 @@ class PreviewSurfaces:
             return Value()
         attribute = attributes[0]
         if not UsdShade.Output.IsOutput(attribute):
-            if attribute.GetNumTimeSamples() > 1:
+            if changes(attribute, self.frames):
                 self.report.warn(path, f"animated {name}", "materials have no animation; the first frame is used")
             return Value(constant=attribute.Get(self.code))
         source = UsdShade.Shader(attribute.GetPrim())

@@ -18,7 +18,7 @@ from .instancers import Placements, read_placements
 from .light_inputs import Light, light_type, read_light
 from .mesh import MeshReader, MeshSource
 from .report import Report
-from .stage import PREDICATE, PROTOTYPE_PREDICATE, Frames
+from .stage import PREDICATE, PROTOTYPE_PREDICATE, Frames, changes
 from .transforms import column
 
 _POLE_Z = np.array([[1, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]], dtype=float)
@@ -85,7 +85,7 @@ class PrimTree:
         if prim.IsA(UsdGeom.Imageable):
             imageable = UsdGeom.Imageable(prim)
             visibility = imageable.GetVisibilityAttr()
-            if visibility.ValueMightBeTimeVarying():
+            if changes(visibility, self.frames):
                 self.report.warn(path, "animated visibility", "it has no carrier; the first frame's is used")
             if visibility.Get(self.frames.first) == UsdGeom.Tokens.invisible:
                 self.report.count("invisible prims")

@@ -47,6 +47,8 @@ def read_primvar(
     primvar = UsdGeom.PrimvarsAPI(prim).FindPrimvarWithInheritance(name)
     if not primvar or not primvar.HasValue():
         return None
+    if primvar.ValueMightBeTimeVarying() and primvar.GetAttr().GetNumTimeSamples() > 1:
+        report.warn(prim.GetPath(), f"animated primvars:{name}", "the first frame's values are used")
     raw = primvar.Get(code)
     interpolation = primvar.GetInterpolation()
     try:

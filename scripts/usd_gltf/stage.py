@@ -49,11 +49,21 @@ class Frames:
         return (np.array(self.codes) - self.codes[0]) / self.codes_per_second
 
 
-def first_line(error: Exception) -> str:
-    """The one line of a Tf exception that says what is wrong."""
+def first_line(error: Exception, path: Path) -> str:
+    """The one line of a Tf exception that says what is wrong in `path`."""
     text = str(error)
-    lines = re.findall(r"in file \S+ : '(.*?)'?\s*$", text, re.MULTILINE) or text.strip().splitlines()
-    return lines[-1].strip() if lines else type(error).__name__
+    messages = re.findall(r"in file \S+ : '(.*?)'?\s*(?=\n\tError in|\Z)", text, re.DOTALL)
+    line = " ".join((messages or [text])[0].split()) or type(error).__name__
+    line = re.sub(r"parse error matching .*(?= at ')", "parse error", line)
+    return line.removeprefix(str(path)).removeprefix(":")
+
+
+def changes(attribute: Usd.Attribute, frames: Frames) -> bool:
+    """Whether the attribute's value differs between two of the frames."""
+    if not attribute or not attribute.ValueMightBeTimeVarying() or len(frames.codes) < 2:
+        return False
+    first = attribute.Get(frames.first)
+    return any(attribute.Get(code) != first for code in frames.codes[1:])
 
 
 def open_stage(path: Path, options: Options, report: Report) -> Usd.Stage:
@@ -63,7 +73,7 @@ def open_stage(path: Path, options: Options, report: Report) -> Usd.Stage:
     try:
         stage = Usd.Stage.Open(str(path), Usd.Stage.LoadAll)
     except (Tf.ErrorException, RuntimeError) as error:
-        raise ExportError(f"{path}: USD cannot read it: {first_line(error)}") from None
+        raise ExportError(f"{path}: USD cannot read it: {first_line(error, path)}") from None
     for prim_path, variant_set, selection in options.variants:
         _select_variant(stage, path, prim_path, variant_set, selection)
     for error in stage.GetCompositionErrors():
