@@ -54,9 +54,9 @@ def read_camera(
     if math.isfinite(far) and number(far * meters_per_unit) > perspective["znear"]:
         perspective["zfar"] = number(far * meters_per_unit)
     extras = {
-        "fStop": _finite(get(camera.GetFStopAttr())),
+        "fStop": max(_finite(get(camera.GetFStopAttr())), 0.0),
         "focalLength_m": number(focal * _TENTH * meters_per_unit),
-        "focusDistance_m": _finite(get(camera.GetFocusDistanceAttr()) * meters_per_unit),
+        "focusDistance_m": max(_finite(get(camera.GetFocusDistanceAttr()) * meters_per_unit), 0.0),
         "filmOffset": [
             _finite(get(camera.GetHorizontalApertureOffsetAttr()) / width),
             _finite(get(camera.GetVerticalApertureOffsetAttr()) / height),

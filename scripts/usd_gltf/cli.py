@@ -9,6 +9,7 @@ import argparse
 import json
 import re
 import sys
+import traceback
 from pathlib import Path
 
 from pxr import UsdUtils
@@ -25,6 +26,7 @@ _PURPOSES = ("default", "render", "proxy", "guide")
 def main(arguments: list[str]) -> int:
     """Run the exporter; returns the exit code."""
     options = _parser().parse_args(arguments)
+    sys.setrecursionlimit(20_000)  # a prim hierarchy may be deep
     try:
         return _run(options)
     except ExportError as error:
@@ -33,6 +35,11 @@ def main(arguments: list[str]) -> int:
         print(f"error: {error.filename or options.output}: {error.strerror or error}", file=sys.stderr)
     except MemoryError:
         print(f"error: {options.source}: not enough memory", file=sys.stderr)
+    except Exception as error:  # noqa: BLE001 (a farm's log wants one line, and an exit code)
+        place = traceback.extract_tb(error.__traceback__)[-1]
+        text = " ".join(str(error).split())
+        where = f"{Path(place.filename).name}:{place.lineno}"
+        print(f"error: {options.source}: unexpected {type(error).__name__} at {where}: {text}", file=sys.stderr)
     return 1
 
 

@@ -81,7 +81,7 @@ class LightCarriers:
                 return
             size = {name: max(value, _THIN * max(size.values())) for name, value in size.items()}
             area = _each_frame(world, lambda linear: world_area(light.type, size, linear))
-        nits = self._normalized(light, area)
+        nits = self._writable(light, self._normalized(light, area))
         if light.treat_as_point:
             self._punctual(light, node, extras, _times(nits, area * (self.square_metres / 4)))
             return
@@ -101,6 +101,14 @@ class LightCarriers:
             return light.rgb
         area = np.asarray(area, dtype=float) * self.normalize_unit
         return _times(light.rgb, np.where(area > 0, 1.0 / np.maximum(area, 1e-300), 0.0))
+
+    def _writable(self, light: Light, rgb: np.ndarray) -> np.ndarray:
+        """Emission that a 32-bit number holds."""
+        top = float(np.finfo(np.float32).max)
+        if not (rgb <= top).all():
+            why = "its area is so small that its radiance overflows a 32-bit number; the largest is used"
+            self.report.warn(light.path, "emission too strong", why)
+        return np.minimum(rgb, top)
 
     def _without_size(self, light: Light, node: dict, extras: dict) -> None:
         """The limit of a normalized light that shrinks to a point."""
@@ -143,7 +151,7 @@ class LightCarriers:
             area = _each_frame(world, mesh.area)
             if np.max(area) <= 0.0:
                 self.report.warn(light.path, f"{light.type} emits nothing", "it has no area")
-            rgb = self._normalized(light, area)
+            rgb = self._writable(light, self._normalized(light, area))
         if rgb.ndim == 2 and len({piece.glow for piece in mesh.pieces_lit(light.material_sync)}) > 1:
             why = "its parts glow differently; the first frame's values are used"
             self.report.warn(light.path, "animated light on a mesh of several materials", why)

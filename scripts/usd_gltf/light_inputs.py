@@ -54,7 +54,9 @@ class Light:
     @property
     def extras(self) -> dict:
         """The part of `extras.usdLux` that does not depend on where the light stands."""
-        extras: dict = {"type": self.type, "inputs": self.inputs}
+        # A DomeLight_1 differs by its pole axis only, which is in the node's matrix by now.
+        kind = "DomeLight" if self.type == "DomeLight_1" else self.type
+        extras: dict = {"type": kind, "inputs": self.inputs}
         if self.shaping is not None:
             extras["shaping"] = self.shaping
         if self.force:
@@ -190,7 +192,7 @@ class _Reader:
             "coneAngle": cone,
             "coneSoftness": softness,
             "focus": focus,
-            "focusTint": tint,
+            "focusTint": [max(c, 0.0) for c in tint],
         }
 
 

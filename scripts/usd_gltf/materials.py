@@ -5,13 +5,18 @@ Emission is a factor within [0, 1] times `KHR_materials_emissive_strength`, in n
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 from pxr import Sdf, Usd, UsdShade
 
 from .gltf_document import Document, number, numbers
 from .report import Report
+
+if TYPE_CHECKING:
+    from .mesh import Piece
 
 
 @dataclass
@@ -48,7 +53,9 @@ class Look:
 class Materials:
     """Resolves bindings to looks, and looks to glTF materials."""
 
-    def __init__(self, document: Document, read_surface, report: Report) -> None:
+    def __init__(
+        self, document: Document, read_surface: Callable[[UsdShade.Material], Look], report: Report
+    ) -> None:
         self.document, self.read_surface, self.report = document, read_surface, report
         self._looks: dict[Sdf.Path, Look] = {}
         self._unbound = Look()
@@ -70,8 +77,8 @@ class Materials:
             self._looks[key] = self.read_surface(material)
         return self._looks[key]
 
-    def index(self, piece, emission: Emission | None = None) -> int:
-        """The glTF material of a `mesh.Piece`; `emission` replaces its look's own glow."""
+    def index(self, piece: Piece, emission: Emission | None = None) -> int:
+        """The glTF material of a piece of a mesh; `emission` replaces its look's own glow."""
         look = piece.look
         color = look.base_color if piece.tint is None else piece.tint
         mode = "BLEND" if piece.translucent and look.alpha_mode == "OPAQUE" else look.alpha_mode

@@ -41,6 +41,8 @@ class NodeWriter:
 
     def write(self, prims: list[Prim], root: dict) -> None:
         """Write all prims under the node `root`."""
+        while root["name"] in {prim.name for prim in prims}:
+            root["name"] += "_"
         index = self.document.node(root)
         children = [self._prim(prim, prim.path, np.eye(4)) for prim in prims]
         children = [child for child in children if child >= 0] + self._top

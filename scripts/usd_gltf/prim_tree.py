@@ -66,14 +66,23 @@ class PrimTree:
         self._open: set[str] = set()
         self._lights: dict[tuple[str, str], Light] = {}
         self._geometry_lights: dict[str, Usd.Prim] = {}
+        self._lit_geometry: set[str] = set()
         for prim in Usd.PrimRange(stage.GetPseudoRoot(), PREDICATE):
             if prim.GetTypeName() == "GeometryLight":
+                light = UsdGeom.Imageable(prim)
+                if light.ComputeVisibility(frames.first) == UsdGeom.Tokens.invisible:
+                    continue
                 for target in prim.GetRelationship("geometry").GetTargets():
                     self._geometry_lights[str(target)] = prim
 
     def roots(self) -> list[Prim]:
         """The exported prims at the top of the stage."""
-        found = (self._compile(prim, None, PREDICATE) for prim in self.stage.GetPseudoRoot().GetFilteredChildren(PREDICATE))
+        top = self.stage.GetPseudoRoot().GetFilteredChildren(PREDICATE)
+        found = [self._compile(prim, None, PREDICATE) for prim in top]
+        for target, light in self._geometry_lights.items():
+            if target not in self._lit_geometry:
+                why = f"its geometry {target} is not there, not shown, or no mesh"
+                self.report.warn(light.GetPath(), "GeometryLight emits nothing", why)
         return [prim for prim in found if prim is not None]
 
     def _compile(self, prim: Usd.Prim, purpose, predicate) -> Prim | None:
@@ -95,7 +104,7 @@ class PrimTree:
         compiled = Prim(str(path), prim.GetName(), np.eye(4))
         if prim.IsA(UsdGeom.Xformable):
             compiled.local, compiled.resets = self._local(prim)
-            if not np.isfinite(compiled.local).all():
+            if not (np.abs(compiled.local) < 3e38).all():
                 self.report.warn(path, "transform that is not finite", "the prim and all below it are left out")
                 return None
         if prim.IsA(UsdGeom.PointInstancer):
@@ -139,9 +148,9 @@ class PrimTree:
         if prim.IsA(UsdGeom.Mesh) or kind in gprims.TYPES:
             compiled.mesh = self.meshes.read(prim)
             light_prim = geometry_light or prim
-            light = light_type(light_prim)
-            if light is not None and compiled.mesh is not None:
-                compiled.light = self._light(light_prim, "MeshLight" if geometry_light else light)
+            if compiled.mesh is not None and light_type(light_prim) is not None:
+                compiled.light = self._light(light_prim, "MeshLight")
+                self._lit_geometry.add(str(path))
         elif prim.IsA(UsdGeom.Camera):
             compiled.camera = read_camera(prim, self.frames, self.meters_per_unit, self.report)
         elif kind == "GeometryLight":
