@@ -12,13 +12,13 @@ import sys
 import traceback
 from pathlib import Path
 
-from pxr import UsdUtils
+from pxr import Tf, UsdUtils
 
 from .export import export
 from .gltf_document import write_atomically
 from .report import ExportError
 from .source_hash import recorded_hash, source_hash
-from .stage import Options
+from .stage import Options, first_line
 
 _PURPOSES = ("default", "render", "proxy", "guide")
 
@@ -33,6 +33,8 @@ def main(arguments: list[str]) -> int:
         print(f"error: {error}", file=sys.stderr)
     except OSError as error:
         print(f"error: {error.filename or options.output}: {error.strerror or error}", file=sys.stderr)
+    except Tf.ErrorException as error:
+        print(f"error: {options.source}: USD failed: {first_line(error, options.source)}", file=sys.stderr)
     except MemoryError:
         print(f"error: {options.source}: not enough memory", file=sys.stderr)
     except Exception as error:  # noqa: BLE001 (a farm's log wants one line, and an exit code)
@@ -49,9 +51,10 @@ def _parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("source", type=Path, help="a .usd, .usda, .usdc or .usdz file")
     parser.add_argument("output", type=_output, help="the .glb or .gltf file to write")
-    parser.add_argument("--frames", type=_frames, metavar="A-B", help="frames (time codes) to export; default: the stage's")
-    parser.add_argument("--variant", nargs="+", action="extend", default=[], type=_variant, metavar="/PRIM{SET=SELECTION}",
-                        help="variant selections")  # fmt: skip
+    parser.add_argument("--frames", type=_frames, metavar="A-B",
+                        help="frames (time codes) to export; default: the stage's")  # fmt: skip
+    parser.add_argument("--variant", nargs="+", action="extend", default=[], type=_variant,
+                        metavar="/PRIM{SET=SELECTION}", help="variant selections")  # fmt: skip
     parser.add_argument("--purpose", type=_purposes, default=("default", "render"), metavar="LIST",
                         help="purposes to export, of default,render,proxy,guide (default: default,render)")  # fmt: skip
     parser.add_argument("--normalize-area", choices=("stage", "metre"), default="stage",

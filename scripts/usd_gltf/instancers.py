@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from pxr import Usd, UsdGeom
 
+from .primvars import as_rows
 from .report import Report
 from .stage import Frames
 from .transforms import column
@@ -67,7 +68,7 @@ def _state(instancer: UsdGeom.PointInstancer, code: float) -> tuple[np.ndarray, 
     matrices = instancer.ComputeInstanceTransformsAtTime(
         time, time, kind.ExcludeProtoXform, kind.IgnoreMask
     )
-    prototypes = np.array(instancer.GetProtoIndicesAttr().Get(time) or [], dtype=int)
+    prototypes = as_rows(instancer.GetProtoIndicesAttr().Get(time), 1, int)
     mask = instancer.ComputeMaskAtTime(time)
     shown = np.array(mask, dtype=bool) if len(mask) == len(prototypes) else np.ones(len(prototypes), bool)
     stack = column(np.array(matrices, dtype=float).reshape(-1, 4, 4))

@@ -124,7 +124,7 @@ class _Reader:
     def size(self, name: str) -> float:
         """A length or an angle that is finite and not negative."""
         value = float(self.at_first(name))
-        if not math.isfinite(value) or value < 0:
+        if not 0 <= value < 1e30:
             self.report.warn(self.prim.GetPath(), f"inputs:{name} is not a size", f"it is {value}; 0 is used")
             return 0.0
         return value

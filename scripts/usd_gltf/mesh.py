@@ -19,7 +19,7 @@ from . import gprims
 from .gltf_document import Document
 from .light_inputs import Light
 from .materials import Emission, Look, Materials
-from .primvars import CornerValues, read_normals, read_primvar
+from .primvars import CornerValues, as_rows, read_normals, read_primvar
 from .report import Report
 from .stage import Frames, changes
 from .triangulate import triangulate
@@ -131,7 +131,11 @@ class MeshReader:
         if polygons is None:
             return None
         points, counts, corners, normals = polygons
-        triangles, faces = triangulate(points, counts, corners)
+        points = np.where(np.abs(points) < 3e38, points, np.nan)
+        if not np.isfinite(points).all():
+            self.report.warn(prim.GetPath(), "points that are not finite", "faces that use them are left out")
+        with np.errstate(invalid="ignore", over="ignore"):  # the faces of such points go below
+            triangles, faces = triangulate(points, counts, corners)
         keep = ~np.isin(faces, self._holes(prim))
         keep &= np.isfinite(points).all(axis=1)[corners[triangles]].all(axis=1)
         triangles, faces = triangles[keep], faces[keep]
@@ -148,7 +152,7 @@ class MeshReader:
 
         owner = np.zeros(int(counts.size), int)
         for number, subset in enumerate(subsets, start=1):
-            members = np.array(UsdGeom.Subset(subset).GetIndicesAttr().Get(self.code) or [], dtype=int)
+            members = as_rows(UsdGeom.Subset(subset).GetIndicesAttr().Get(self.code), 1, int)
             inside = (members >= 0) & (members < len(owner))
             if not inside.all():
                 self.report.warn(subset.GetPath(), "GeomSubset indices out of range", "they are left out")
@@ -183,30 +187,27 @@ class MeshReader:
         for name, attribute in attributes.items():
             if changes(attribute, self.frames):
                 self.report.warn(path, f"animated {name}", "deforming meshes have no carrier; the first frame is used")
-        raw = [attribute.Get(self.code) for attribute in attributes.values()]
-        if any(value is None or len(value) == 0 for value in raw):
+        points = as_rows(attributes["points"].Get(self.code), 3)
+        counts = as_rows(attributes["faceVertexCounts"].Get(self.code), 1, int)
+        corners = as_rows(attributes["faceVertexIndices"].Get(self.code), 1, int)
+        if not (len(points) and len(counts) and len(corners)):
             self.report.warn(path, "mesh without faces", "it is left out")
             return None
-        points = np.array(raw[0], dtype=float)
-        counts, corners = np.array(raw[1], dtype=int), np.array(raw[2], dtype=int)
         if (counts < 0).any() or counts.sum() != len(corners):
             why = f"faceVertexCounts sum to {counts.sum()}, faceVertexIndices are {len(corners)}; it is left out"
             self.report.warn(path, "mesh with a broken topology", why)
             return None
         if corners.min() < 0 or corners.max() >= len(points):
-            why = f"faceVertexIndices run from {corners.min()} to {corners.max()}, points are {len(points)}; it is left out"
-            self.report.warn(path, "mesh with a broken topology", why)
+            why = f"faceVertexIndices run from {corners.min()} to {corners.max()}, points are {len(points)}"
+            self.report.warn(path, "mesh with a broken topology", f"{why}; it is left out")
             return None
-        points[np.abs(points) > 3e38] = np.nan
-        if not np.isfinite(points).all():
-            self.report.warn(path, "points that are not finite", "faces that use them are left out")
         if prim.HasRelationship("skel:skeleton") or prim.GetAttribute("primvars:skel:jointIndices").HasAuthoredValue():
             self.report.warn(path, "skinned mesh", "UsdSkel has no carrier; the mesh is exported as its points stand")
         return points, counts, corners, read_normals(prim, self.code, counts, corners, self.report)
 
     def _holes(self, prim: Usd.Prim) -> np.ndarray:
         attribute = prim.GetAttribute("holeIndices")
-        return np.array((attribute.Get(self.code) if attribute else None) or [], dtype=int)
+        return as_rows(attribute.Get(self.code) if attribute else None, 1, int)
 
     def _is_cage(self, prim: Usd.Prim) -> bool:
         """Whether the mesh is a subdivision surface, of which the cage is exported (reported)."""

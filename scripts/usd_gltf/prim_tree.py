@@ -202,7 +202,8 @@ class PrimTree:
         if target not in self._prototypes:
             prim = self.stage.GetPrimAtPath(target)
             if not prim:
-                self.report.warn(instancer, "missing prototype", f"there is no prim {target}; its instances are left out")
+                why = f"there is no prim {target}; its instances are left out"
+                self.report.warn(instancer, "missing prototype", why)
                 return None
             self._open.add(target)
             self._prototypes[target] = self._compile(prim, None, PROTOTYPE_PREDICATE)

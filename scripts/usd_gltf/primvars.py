@@ -19,6 +19,16 @@ class CornerValues:
     constant: bool = False
 
 
+def as_rows(value, width: int, kind: type = float) -> np.ndarray:
+    """A USD array as rows of `width` numbers (a plain vector for width 1); empty if it is no such
+    thing, which a layer may author against the schema."""
+    try:
+        found = np.array(value if value is not None else [], dtype=kind).reshape(-1, width)
+    except (TypeError, ValueError, OverflowError):
+        found = np.zeros((0, width), kind)
+    return found[:, 0] if width == 1 else found
+
+
 def spread(
     values: np.ndarray, interpolation: str, indices: np.ndarray | None, counts: np.ndarray, corners: np.ndarray
 ) -> CornerValues | None:
@@ -49,17 +59,13 @@ def read_primvar(
         return None
     if primvar.ValueMightBeTimeVarying() and primvar.GetAttr().GetNumTimeSamples() > 1:
         report.warn(prim.GetPath(), f"animated primvars:{name}", "the first frame's values are used")
-    raw = primvar.Get(code)
     interpolation = primvar.GetInterpolation()
-    try:
-        values = np.array(raw, dtype=float).reshape(-1, width)
-    except (TypeError, ValueError):
-        report.warn(prim.GetPath(), f"primvars:{name} of an unexpected type", f"{primvar.GetTypeName()}; left out")
-        return None
-    indices = np.array(primvar.GetIndices(code), dtype=int) if primvar.IsIndexed() else None
+    values = as_rows(primvar.Get(code), width).reshape(-1, width)
+    indices = as_rows(primvar.GetIndices(code), 1, int) if primvar.IsIndexed() else None
     found = spread(values, interpolation, indices, counts, corners)
     if found is None:
-        report.warn(prim.GetPath(), f"primvars:{name} does not fit its mesh", f"too few {interpolation} values; left out")
+        why = f"{primvar.GetTypeName()} with too few {interpolation} values; left out"
+        report.warn(prim.GetPath(), f"primvars:{name} does not fit its mesh", why)
         return None
     return finite(found)
 
@@ -72,11 +78,11 @@ def read_normals(
     if found is not None:
         return found
     attribute = prim.GetAttribute("normals")
-    raw = attribute.Get(code) if attribute else None
-    if raw is None or len(raw) == 0:
+    values = as_rows(attribute.Get(code) if attribute else None, 3)
+    if not len(values):
         return None
     interpolation = UsdGeom.PointBased(prim).GetNormalsInterpolation()
-    found = spread(np.array(raw, dtype=float).reshape(-1, 3), interpolation, None, counts, corners)
+    found = spread(values, interpolation, None, counts, corners)
     if found is None:
         report.warn(prim.GetPath(), "normals do not fit their mesh", f"too few {interpolation} values; left out")
         return None
