@@ -1,0 +1,144 @@
+"""The command line: `usd_to_gltf.py in.usd out.glb [options]`.
+
+Exit codes: 0 done or up to date, 1 failed (also warnings under --strict), 2 usage.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import re
+import sys
+import traceback
+from pathlib import Path
+
+from pxr import Tf, UsdUtils
+
+from .export import export
+from .gltf_document import write_atomically
+from .report import ExportError
+from .source_hash import recorded_hash, source_hash
+from .stage import Options, first_line
+
+_PURPOSES = ("default", "render", "proxy", "guide")
+
+
+def main(arguments: list[str]) -> int:
+    """Run the exporter; returns the exit code."""
+    options = _parser().parse_args(arguments)
+    sys.setrecursionlimit(20_000)  # a prim hierarchy may be deep
+    try:
+        return _run(options)
+    except ExportError as error:
+        print(f"error: {error}", file=sys.stderr)
+    except OSError as error:
+        print(f"error: {error.filename or options.output}: {error.strerror or error}", file=sys.stderr)
+    except Tf.ErrorException as error:
+        print(f"error: {options.source}: USD failed: {first_line(error, options.source)}", file=sys.stderr)
+    except MemoryError:
+        print(f"error: {options.source}: not enough memory", file=sys.stderr)
+    except Exception as error:  # noqa: BLE001 (a farm's log wants one line, and an exit code)
+        place = traceback.extract_tb(error.__traceback__)[-1]
+        text = " ".join(str(error).split())
+        where = f"{Path(place.filename).name}:{place.lineno}"
+        print(f"error: {options.source}: unexpected {type(error).__name__} at {where}: {text}", file=sys.stderr)
+    return 1
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="usd_to_gltf.py", description="Export a USD stage to glTF without losing its lights."
+    )
+    parser.add_argument("source", type=Path, help="a .usd, .usda, .usdc or .usdz file")
+    parser.add_argument("output", type=_output, help="the .glb or .gltf file to write")
+    parser.add_argument("--frames", type=_frames, metavar="A-B",
+                        help="frames (time codes) to export; default: the stage's")  # fmt: skip
+    parser.add_argument("--variant", nargs="+", action="extend", default=[], type=_variant,
+                        metavar="/PRIM{SET=SELECTION}", help="variant selections")  # fmt: skip
+    parser.add_argument("--purpose", type=_purposes, default=("default", "render"), metavar="LIST",
+                        help="purposes to export, of default,render,proxy,guide (default: default,render)")  # fmt: skip
+    parser.add_argument("--normalize-area", choices=("stage", "metre"), default="stage",
+                        help="unit of the area that `normalize` divides by (default: stage)")  # fmt: skip
+    parser.add_argument("--strict", action="store_true", help="fail if anything has no carrier or is missing")
+    parser.add_argument("--report", type=Path, metavar="FILE", help="where the report goes (default: OUT.report.json)")
+    return parser
+
+
+def _output(text: str) -> Path:
+    path = Path(text)
+    if path.suffix.lower() not in (".glb", ".gltf"):
+        raise argparse.ArgumentTypeError(f"'{text}' must end in .glb or .gltf")
+    return path
+
+
+def _frames(text: str) -> tuple[int, int]:
+    match = re.fullmatch(r"(-?\d+)(?:-(-?\d+))?", text)
+    if not match:
+        raise argparse.ArgumentTypeError(f"'{text}' is no range of frames; write 1001-1024")
+    first, last = int(match[1]), int(match[2] if match[2] is not None else match[1])
+    if last < first:
+        raise argparse.ArgumentTypeError(f"'{text}' runs backwards")
+    return first, last
+
+
+def _variant(text: str) -> tuple[str, str, str]:
+    match = re.fullmatch(r"(/[^{}]+)\{([^{}=]+)=([^{}=]*)\}", text)
+    if not match:
+        raise argparse.ArgumentTypeError(f"'{text}' is no variant selection; write /Prim{{set=selection}}")
+    return match[1], match[2], match[3]
+
+
+def _purposes(text: str) -> tuple[str, ...]:
+    chosen = tuple(word.strip() for word in text.split(","))
+    for word in chosen:
+        if word not in _PURPOSES:
+            raise argparse.ArgumentTypeError(f"'{word}' is no purpose; choose of {', '.join(_PURPOSES)}")
+    return tuple(sorted(set(chosen)))
+
+
+def _run(arguments: argparse.Namespace) -> int:
+    source, output = arguments.source, arguments.output
+    report_path = arguments.report or output.with_name(output.name + ".report.json")
+    options = Options(
+        frames=arguments.frames,
+        variants=tuple(arguments.variant),
+        purposes=arguments.purpose,
+        normalize_area=arguments.normalize_area,
+    )
+    if not source.is_file():
+        raise ExportError(f"{source}: no such file")
+    # Takes USD's own messages off stderr; what matters of them comes through the report.
+    diagnostics = UsdUtils.CoalescingDiagnosticDelegate()
+    fingerprint = source_hash(source, options)
+    if recorded_hash(output) == fingerprint and _reported(report_path, fingerprint, arguments.strict):
+        print(f"{output}: up to date")
+        return 0
+
+    exported = export(source, output, options, fingerprint)
+    diagnostics.TakeUncoalescedDiagnostics()
+    report = exported.report
+    for line in report.summary():
+        print(line, file=sys.stderr)
+    if arguments.strict and report.warnings:
+        _write_report(report_path, report.to_json(str(source), str(output), fingerprint))
+        count = len(report.warnings)
+        why = f"{count} warning{'s' * (count != 1)} under --strict; nothing was written (see {report_path})"
+        raise ExportError(f"{source}: {why}")
+    exported.document.write(exported.usd)
+    _write_report(report_path, report.to_json(str(source), str(output), fingerprint))
+    counts = ", ".join(f"{number} {what}" for what, number in sorted(report.counts.items()))
+    print(f"{output}: written ({counts})")
+    return 0
+
+
+def _write_report(path: Path, text: str) -> None:
+    write_atomically(path, text.encode("utf-8", errors="replace"))
+
+
+def _reported(path: Path, fingerprint: str, strict: bool) -> bool:
+    """Whether the report of the same export exists, and has no warnings if they are errors."""
+    try:
+        report = json.loads(path.read_bytes())
+        return report["sourceHash"] == fingerprint and not (strict and report["warnings"])
+    except (OSError, ValueError, KeyError, TypeError):
+        return False

@@ -1,0 +1,251 @@
+"""Which glTF object carries which light (`src/ingest/carriers.md`).
+
+Area lights become emissive meshes in nits, points and spots `KHR_lights_punctual` in candela, suns
+`directional` in lux, domes extras. Here the sizeFactor of `normalize` comes in, since it depends on
+the world-space area of one instance.
+
+Two limits that the schema leaves open: a normalized light of no size at all has a power but no
+area, and is carried as the point that it tends to (`L'/4` candela in all directions from a sphere,
+`L' cos(theta)` from a flat light); one of no width but some length is widened to a thousandth of
+its length, which changes nothing but its outline, since it is normalized.
+"""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+
+from .gltf_document import Document, number, numbers
+from .light_inputs import SIZES, Light
+from .light_shapes import Tessellation, tessellate, world_area
+from .materials import Emission, Materials
+from .mesh import MeshSource
+from .report import Report
+from .stage import Frames
+from .textures import Textures
+
+_DOME_FORMATS = {".exr", ".hdr", ".png", ".jpg", ".jpeg"}
+_THIN = 1e-3
+
+
+class LightCarriers:
+    """Puts lights onto glTF nodes."""
+
+    def __init__(
+        self,
+        document: Document,
+        materials: Materials,
+        textures: Textures,
+        frames: Frames,
+        meters_per_unit: float,
+        normalize_area: str,
+        report: Report,
+    ) -> None:
+        self.document, self.materials, self.textures = document, materials, textures
+        self.frames, self.report = frames, report
+        self.square_metres = meters_per_unit**2
+        self.normalize_unit = 1.0 if normalize_area == "stage" else self.square_metres
+        self._tessellations: dict[tuple, dict] = {}
+
+    def carry(self, light: Light, node: dict, world: np.ndarray, mesh: MeshSource | None) -> None:
+        """Make `node`, which stands at `world` (stage units; one matrix or one a frame), this light."""
+        extras = dict(light.extras)
+        node["extras"]["usdLux"] = extras
+        self.report.count(f"lights {light.type}")
+        if mesh is not None:
+            self._mesh_light(light, node, extras, world, mesh)
+        elif light.type in SIZES:
+            self._area_light(light, node, extras, world)
+        elif light.type == "DistantLight":
+            self._distant(light, node, extras)
+        elif light.type in ("DomeLight", "DomeLight_1"):
+            self._dome(light, extras)
+        else:
+            why = "it has no carrier; its inputs are kept in extras"
+            self.report.warn(light.path, light.type, why)
+
+    # -- area lights -----------------------------------------------------------------------------
+
+    def _area_light(self, light: Light, node: dict, extras: dict, world: np.ndarray) -> None:
+        size = light.size
+        area = _each_frame(world, lambda linear: world_area(light.type, size, linear))
+        if np.max(area) <= 0.0:
+            if not light.normalize or max(size.values()) > 0.0 and min(size.values()) > 0.0:
+                why = "its area is 0 and it is not normalized" if not light.normalize else "its scale is 0"
+                self.report.warn(light.path, f"{light.type} emits nothing", why)
+                return
+            if max(size.values()) <= 0.0:
+                self._without_size(light, node, extras)
+                return
+            size = {name: max(value, _THIN * max(size.values())) for name, value in size.items()}
+            area = _each_frame(world, lambda linear: world_area(light.type, size, linear))
+        nits = self._writable(light, self._normalized(light, area))
+        if light.treat_as_point:
+            self._punctual(light, node, extras, _times(nits, area * (self.square_metres / 4)))
+            return
+        texture = None
+        if light.texture is not None and light.type == "RectLight":
+            texture = self.textures.light_texture(light.path, light.texture)
+        if light.type == "SphereLight":
+            extras["radius"] = number(light.size["radius"])
+        self._animated(extras, nits)
+        material = self.materials.light_material(Emission(_first(nits), texture))
+        primitive = {**self._tessellated(light.type, size, texture is not None), "material": material}
+        node["mesh"] = self.document.shared("meshes", {"name": light.type, "primitives": [primitive]})
+
+    def _normalized(self, light: Light, area) -> np.ndarray:
+        """The emission over the sizeFactor: world-space area where `normalize` asks for it."""
+        if not light.normalize:
+            return light.rgb
+        area = np.asarray(area, dtype=float) * self.normalize_unit
+        return _times(light.rgb, np.where(area > 0, 1.0 / np.maximum(area, 1e-300), 0.0))
+
+    def _writable(self, light: Light, rgb: np.ndarray) -> np.ndarray:
+        """Emission that a 32-bit number holds."""
+        top = float(np.finfo(np.float32).max)
+        if not (rgb <= top).all():
+            why = "its area is so small that its radiance overflows a 32-bit number; the largest is used"
+            self.report.warn(light.path, "emission too strong", why)
+        return np.minimum(rgb, top)
+
+    def _without_size(self, light: Light, node: dict, extras: dict) -> None:
+        """The limit of a normalized light that shrinks to a point."""
+        power = light.rgb * (self.square_metres / self.normalize_unit)
+        if light.type in ("RectLight", "DiskLight"):
+            shaping = light.shaping or {"coneAngle": 90.0, "coneSoftness": 0.0, "focus": 0.0, "focusTint": [0.0] * 3}
+            if light.shaping and any(light.shaping["focusTint"]):
+                why = "the cosine of a flat light and the tint cannot both be carried; the tint is lost"
+                self.report.warn(light.path, "focusTint of a light without size", why)
+            extras["shaping"] = {
+                **shaping,
+                "coneAngle": min(shaping["coneAngle"], 90.0),
+                "focus": shaping["focus"] + 1.0,
+                "focusTint": [0.0] * 3,
+            }
+            self._punctual(light, node, extras, power)
+        else:
+            self._punctual(light, node, extras, power / 4)
+
+    def _tessellated(self, kind: str, size: dict[str, float], textured: bool) -> dict:
+        """The primitive, without its material, of a light's shape."""
+        key = (kind, *size.values(), textured)
+        if key not in self._tessellations:
+            shape: Tessellation = tessellate(kind, size)
+            attributes = {
+                "POSITION": self.document.accessor(shape.positions.astype(np.float32), 34962, bounds=True),
+                "NORMAL": self.document.accessor(shape.normals.astype(np.float32), 34962),
+            }
+            if textured:
+                attributes["TEXCOORD_0"] = self.document.accessor(shape.uvs.astype(np.float32), 34962)
+            indices = self.document.indices(shape.triangles.reshape(-1))
+            self._tessellations[key] = {"attributes": attributes, "indices": indices}
+        return self._tessellations[key]
+
+    def _mesh_light(
+        self, light: Light, node: dict, extras: dict, world: np.ndarray, mesh: MeshSource
+    ) -> None:
+        rgb = light.rgb
+        if light.normalize:
+            area = _each_frame(world, mesh.area)
+            if np.max(area) <= 0.0:
+                self.report.warn(light.path, f"{light.type} emits nothing", "it has no area")
+            rgb = self._writable(light, self._normalized(light, area))
+        if rgb.ndim == 2 and len({piece.glow for piece in mesh.pieces_lit(light.material_sync)}) > 1:
+            why = "its parts glow differently; the first frame's values are used"
+            self.report.warn(light.path, "animated light on a mesh of several materials", why)
+            rgb = rgb[0]
+        lit = mesh.lit_primitives(self.materials, light, rgb)
+        if rgb.ndim == 2 and lit:
+            self._animated(extras, rgb * np.array(mesh.pieces_lit(light.material_sync)[0].glow))
+        node["mesh"] = self.document.shared("meshes", {"name": mesh.name, "primitives": lit})
+
+    # -- lights without area ---------------------------------------------------------------------
+
+    def _punctual(self, light: Light, node: dict, extras: dict, candela: np.ndarray) -> None:
+        """A point, or a spot if the light is shaped."""
+        self._animated(extras, candela)
+        shaping = extras.get("shaping")
+        if shaping is None:
+            self._khr_light(node, "point", _first(candela))
+            return
+        outer = math.radians(min(shaping["coneAngle"], 90.0))
+        if outer <= 0.0:
+            self.report.warn(light.path, f"{light.type} emits nothing", "its cone angle is 0")
+            return
+        inner = min(math.radians(shaping["coneAngle"] * (1 - shaping["coneSoftness"])), outer * 0.9999)
+        spot = {"innerConeAngle": number(inner), "outerConeAngle": min(number(outer), math.pi / 2)}
+        self._khr_light(node, "spot", _first(candela), spot)
+
+    def _distant(self, light: Light, node: dict, extras: dict) -> None:
+        """Lux on a facing surface: `L pi sin^2(angle/2)`; a sun of no angle is given in lux."""
+        half = math.radians(light.angle_deg) / 2
+        facing = math.pi * math.sin(min(half, math.pi / 2)) ** 2 if half > 0 else 1.0
+        if light.normalize:
+            if half > math.pi / 2:
+                facing /= math.pi * (2 - math.sin(half) ** 2)
+            elif half > 0:
+                facing = 1.0
+        lux = light.rgb * facing
+        extras["angle"] = number(light.angle_deg)
+        self._animated(extras, lux)
+        self._khr_light(node, "directional", _first(lux))
+        if light.shaping is not None:
+            self.report.warn(light.path, "shaping of a DistantLight", "it has no position to be shaped from")
+            extras.pop("shaping", None)
+
+    def _dome(self, light: Light, extras: dict) -> None:
+        extras["radiance"] = numbers(_first(light.rgb))
+        self._animated(extras, light.rgb)
+        extras.pop("shaping", None)
+        if light.texture is None:
+            return
+        found = self.textures.read(light.path, light.texture)
+        if found is None:
+            return
+        name, data, existing = found
+        if Path(name).suffix.lower() not in _DOME_FORMATS:
+            why = f"{name}: only .exr, .hdr, .png and .jpg have a carrier; the dome is exported untextured"
+            self.report.warn(light.path, "dome texture's format", why)
+            return
+        extras["texture"] = self.document.side_file(name, data, existing)
+
+    def _khr_light(self, node: dict, kind: str, rgb: np.ndarray, spot: dict | None = None) -> None:
+        strength = float(np.max(rgb))
+        color = rgb / strength if strength > 0 else np.ones(3)
+        light: dict = {"type": kind, "color": numbers(color), "intensity": number(strength)}
+        if spot is not None:
+            light["spot"] = spot
+        index = self.document.shared("lights", light)
+        extension = self.document.use("KHR_lights_punctual")
+        node["extensions"] = {extension: {"light": index}}
+
+    def _animated(self, extras: dict, rgb: np.ndarray) -> None:
+        """`extras.usdLux.values`, if the light varies."""
+        if rgb.ndim == 2:
+            extras["values"] = {
+                "times": numbers(self.frames.seconds),
+                "rgb": [numbers(row) for row in rgb],
+            }
+
+
+def _each_frame(world: np.ndarray, area) -> np.ndarray | float:
+    """`area` of the linear part of `world`; one for each frame if the scale varies."""
+    if world.ndim == 2:
+        return area(world[:3, :3])
+    linear = world[:, :3, :3]
+    gram = np.swapaxes(linear, 1, 2) @ linear
+    if np.allclose(gram, gram[0], rtol=1e-6, atol=0):
+        return area(linear[0])
+    return np.array([area(matrix) for matrix in linear])
+
+
+def _times(rgb: np.ndarray, factor) -> np.ndarray:
+    """rgb, (3,) or (frames, 3), times a number or one number for each frame."""
+    factor = np.asarray(factor, dtype=float)
+    return rgb * (factor[:, None] if factor.ndim else factor)
+
+
+def _first(rgb: np.ndarray) -> np.ndarray:
+    return rgb[0] if rgb.ndim == 2 else rgb

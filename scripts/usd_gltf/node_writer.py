@@ -1,0 +1,166 @@
+"""Stamps the prim tree into glTF nodes: one node for each prim, and again for each instance.
+
+Every node carries `extras.usdPath`. Instances of a PointInstancer are named by their number in it:
+`/World/Lamps[12]` is the twelfth instance, `/World/Lamps[12]/Bulb` what its prototype holds.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .animation import animate, varies
+from .gltf_document import Document, numbers
+from .instancers import Placements
+from .light_carriers import LightCarriers
+from .materials import Materials
+from .mesh import MeshSource
+from .prim_tree import Prim
+from .report import Report
+from .stage import Frames
+from .transforms import SHEAR_TOLERANCE, decompose, split_shear
+
+_DEFAULTS = {"translation": [0.0] * 3, "rotation": [0.0, 0.0, 0.0, 1.0], "scale": [1.0] * 3}
+
+
+class NodeWriter:
+    """Writes nodes below one root that turns stage units and axes into metres and +Y up."""
+
+    def __init__(
+        self,
+        document: Document,
+        materials: Materials,
+        carriers: LightCarriers,
+        frames: Frames,
+        report: Report,
+    ) -> None:
+        self.document, self.materials, self.carriers = document, materials, carriers
+        self.frames, self.report = frames, report
+        self._meshes: dict[int, int] = {}
+        self._still: dict[int, tuple[dict, dict | None]] = {}
+        self._top: list[int] = []
+
+    def write(self, prims: list[Prim], root: dict) -> None:
+        """Write all prims under the node `root`."""
+        while root["name"] in {prim.name for prim in prims}:
+            root["name"] += "_"
+        index = self.document.node(root)
+        children = [self._prim(prim, prim.path, np.eye(4)) for prim in prims]
+        children = [child for child in children if child >= 0] + self._top
+        if children:
+            root["children"] = children
+        self.document.roots = [index]
+
+    def _prim(self, prim: Prim, path: str, above: np.ndarray) -> int:
+        """The node of a prim that stands under the world matrices `above`."""
+        world = (prim.local if prim.resets else above @ prim.local) if prim.lit else above
+        if prim.local.ndim == 3:
+            node, outer = self._moving(path, prim.name, prim.local)
+        else:
+            if id(prim) not in self._still:
+                self._still[id(prim)] = _still(prim.local)
+            node, outer = self._placed(path, prim.name, *self._still[id(prim)])
+        self._fill(node, prim, path, world)
+        if not prim.resets:
+            return outer
+        # The child of no one: it stands by its own matrix alone.
+        self._top.append(outer)
+        return -1
+
+    def _fill(self, node: dict, prim: Prim, path: str, world: np.ndarray) -> None:
+        """Content and children of a node."""
+        if prim.camera is not None:
+            camera, extras = prim.camera
+            node["camera"] = self.document.shared("cameras", camera)
+            node["extras"]["usdCamera"] = extras
+        if prim.light is not None:
+            self.carriers.carry(prim.light, node, world, prim.mesh)
+        elif prim.mesh is not None:
+            node["mesh"] = self._mesh(prim.mesh)
+        children = [self._prim(child, path + child.path[len(prim.path) :], world) for child in prim.children]
+        for prototype, placements in prim.instances:
+            children += self._instances(prototype, placements, path, world)
+        children = [child for child in children if child >= 0]
+        if children:
+            node["children"] = children
+
+    def _mesh(self, mesh: MeshSource) -> int:
+        if id(mesh) not in self._meshes:
+            body = {"name": mesh.name, "primitives": mesh.primitives(self.materials)}
+            self._meshes[id(mesh)] = self.document.shared("meshes", body)
+        return self._meshes[id(mesh)]
+
+    def _instances(self, prototype: Prim, placements: Placements, path: str, world: np.ndarray) -> list[int]:
+        """Nodes of all instances of one prototype; the prototype's root is the instance's node."""
+        local = prototype.local if prototype.local.ndim == 2 else prototype.local[:, None]
+        matrices = placements.matrices @ local
+        moving = matrices.ndim == 4
+        static = None if moving else decompose(matrices)
+        nodes = []
+        for position, number in enumerate(placements.numbers):
+            name = f"{path}[{number}]"
+            matrix = matrices[:, position] if moving else matrices[position]
+            if moving:
+                node, outer = self._moving(name, prototype.name, matrix)
+            elif static[3][position] > SHEAR_TOLERANCE:
+                node, outer = self._placed(name, prototype.name, *_still(matrix))
+            else:
+                place = _place(*(part[position] for part in static[:3]))
+                node, outer = self._placed(name, prototype.name, place, None)
+            self._fill(node, prototype, name, world @ matrix if prototype.lit else world)
+            nodes.append(outer)
+        return nodes
+
+    def _placed(self, path: str, name: str, place: dict, outside: dict | None) -> tuple[dict, int]:
+        """A node that stands still, and the index of the node to hang under the parent."""
+        node = {"name": name, "extras": {"usdPath": path}, **place}
+        index = self.document.node(node)
+        if outside is None:
+            return node, index
+        return node, self.document.node({"name": f"{name}_shear", "children": [index], **outside})
+
+    def _moving(self, path: str, name: str, local: np.ndarray) -> tuple[dict, int]:
+        """A node that follows `local` (frames, 4, 4), and its index."""
+        translation, rotation, scale, shear = decompose(local)
+        if shear.max() > SHEAR_TOLERANCE:
+            why = "translation, rotation and scale cannot hold it over time; the nearest ones are used"
+            self.report.warn(path, "animated shear", why)
+        node = {"name": name, "extras": {"usdPath": path}, **_place(translation[0], rotation[0], scale[0])}
+        index = self.document.node(node)
+        tracks = {"translation": translation, "rotation": rotation, "scale": scale}
+        for key, values in tracks.items():
+            if varies(values):
+                node.setdefault(key, list(_DEFAULTS[key]))
+        self.report.count("animation channels", animate(self.document, index, self.frames.seconds, tracks))
+        return node, index
+
+
+def _still(local: np.ndarray) -> tuple[dict, dict | None]:
+    """Node properties that hold a matrix; a second set, for a node around it, if it has shear.
+
+    One node cannot hold shear, but two can: a rotated scale around a rotation.
+    """
+    translation, rotation, scale, shear = decompose(local[None])
+    if shear[0] <= SHEAR_TOLERANCE:
+        return _place(translation[0], rotation[0], scale[0]), None
+    outer, inner = (decompose(matrix[None]) for matrix in split_shear(local))
+    return _place(*(part[0] for part in inner[:3])), _place(*(part[0] for part in outer[:3]))
+
+
+def _place(translation: np.ndarray, rotation: np.ndarray, scale: np.ndarray) -> dict:
+    """What differs from glTF's defaults."""
+    place = {}
+    for key, value in (("translation", translation), ("rotation", rotation), ("scale", scale)):
+        rounded = numbers(value)
+        if rounded != _DEFAULTS[key]:
+            place[key] = rounded
+    return place
+
+
+def root_node(meters_per_unit: float, z_up: bool) -> dict:
+    """The node that turns stage units into metres and the stage's up axis into +Y."""
+    node: dict = {"name": "stage"}
+    if z_up:
+        node["rotation"] = numbers((-np.sqrt(0.5), 0.0, 0.0, np.sqrt(0.5)))
+    if meters_per_unit != 1.0:
+        node["scale"] = numbers([meters_per_unit] * 3)
+    return node

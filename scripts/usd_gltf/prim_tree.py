@@ -1,0 +1,211 @@
+"""USD prims compiled into a plain tree, each prototype once.
+
+What is invisible, of another purpose, or not there at all is left out here; what has no carrier is
+reported here. The tree knows nothing of glTF nodes: `node_writer` stamps it, as often as instances
+ask for it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from pxr import Usd, UsdGeom, UsdLux, UsdShade
+
+from . import gprims
+from .cameras import read_camera
+from .instancers import Placements, read_placements
+from .light_inputs import Light, light_type, read_light
+from .mesh import MeshReader, MeshSource
+from .report import Report
+from .stage import PREDICATE, PROTOTYPE_PREDICATE, Frames, changes
+from .transforms import column
+
+_POLE_Z = np.array([[1, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]], dtype=float)
+"""DomeLight_1 with its pole along Z: local +Y goes to +Z, +Z to -Y (usdLux/schema.usda)."""
+
+
+@dataclass
+class Prim:
+    """A prim to be exported, in its parent's space."""
+
+    path: str
+    name: str
+    local: np.ndarray
+    """(4, 4), or (frames, 4, 4) if it moves."""
+    resets: bool = False
+    mesh: MeshSource | None = None
+    light: Light | None = None
+    camera: tuple[dict, dict] | None = None
+    instances: list[tuple[Prim, Placements]] = field(default_factory=list)
+    children: list[Prim] = field(default_factory=list)
+    lit: bool = False
+    """Whether there is a light in the subtree (then world matrices matter)."""
+
+    @property
+    def is_empty(self) -> bool:
+        """Whether nothing would be exported."""
+        return not (self.mesh or self.light or self.camera or self.instances or self.children)
+
+
+class PrimTree:
+    """Compiles a stage."""
+
+    def __init__(
+        self,
+        stage: Usd.Stage,
+        meshes: MeshReader,
+        frames: Frames,
+        purposes: tuple[str, ...],
+        meters_per_unit: float,
+        report: Report,
+    ) -> None:
+        self.stage, self.meshes, self.frames = stage, meshes, frames
+        self.purposes, self.meters_per_unit, self.report = purposes, meters_per_unit, report
+        self._prototypes: dict[str, Prim | None] = {}
+        self._open: set[str] = set()
+        self._lights: dict[tuple[str, str], Light] = {}
+        self._geometry_lights: dict[str, Usd.Prim] = {}
+        self._lit_geometry: set[str] = set()
+        for prim in Usd.PrimRange(stage.GetPseudoRoot(), PREDICATE):
+            if prim.GetTypeName() == "GeometryLight":
+                light = UsdGeom.Imageable(prim)
+                if light.ComputeVisibility(frames.first) == UsdGeom.Tokens.invisible:
+                    continue
+                for target in prim.GetRelationship("geometry").GetTargets():
+                    self._geometry_lights[str(target)] = prim
+
+    def roots(self) -> list[Prim]:
+        """The exported prims at the top of the stage."""
+        top = self.stage.GetPseudoRoot().GetFilteredChildren(PREDICATE)
+        found = [self._compile(prim, None, PREDICATE) for prim in top]
+        for target, light in self._geometry_lights.items():
+            if target not in self._lit_geometry:
+                why = f"its geometry {target} is not there, not shown, or no mesh"
+                self.report.warn(light.GetPath(), "GeometryLight emits nothing", why)
+        return [prim for prim in found if prim is not None]
+
+    def _compile(self, prim: Usd.Prim, purpose, predicate) -> Prim | None:
+        """The tree below `prim`, or None if there is nothing in it to export."""
+        if prim.IsA(UsdShade.Material) or prim.IsA(UsdShade.NodeGraph):
+            return None
+        path = prim.GetPath()
+        shown = True
+        if prim.IsA(UsdGeom.Imageable):
+            imageable = UsdGeom.Imageable(prim)
+            visibility = imageable.GetVisibilityAttr()
+            if changes(visibility, self.frames):
+                self.report.warn(path, "animated visibility", "it has no carrier; the first frame's is used")
+            if visibility.Get(self.frames.first) == UsdGeom.Tokens.invisible:
+                self.report.count("invisible prims")
+                return None
+            purpose = imageable.ComputePurposeInfo(purpose) if purpose else imageable.ComputePurposeInfo()
+            shown = str(purpose.purpose) in self.purposes
+        compiled = Prim(str(path), prim.GetName(), np.eye(4))
+        if prim.IsA(UsdGeom.Xformable):
+            compiled.local, compiled.resets = self._local(prim)
+            if not (np.abs(compiled.local) < 3e38).all():
+                self.report.warn(path, "transform that is not finite", "the prim and all below it are left out")
+                return None
+        if prim.IsA(UsdGeom.PointInstancer):
+            if shown:
+                self._instances(prim, compiled)
+        else:
+            if shown:
+                self._content(prim, compiled)
+            for child in prim.GetFilteredChildren(predicate):
+                below = self._compile(child, purpose, predicate)
+                if below is not None:
+                    compiled.children.append(below)
+        if compiled.light is not None and compiled.light.pole_z:
+            self._turn_dome(compiled)
+        if compiled.is_empty:
+            return None
+        compiled.lit = (
+            compiled.light is not None
+            or any(child.lit for child in compiled.children)
+            or any(prototype.lit for prototype, _ in compiled.instances)
+        )
+        return compiled
+
+    def _local(self, prim: Usd.Prim) -> tuple[np.ndarray, bool]:
+        """The local matrix, or one for each frame, and whether it ignores the parents'."""
+        xformable = UsdGeom.Xformable(prim)
+        resets = xformable.GetResetXformStack()
+        if xformable.TransformMightBeTimeVarying() and len(self.frames.codes) > 1:
+            stack = [xformable.GetLocalTransformation(code) for code in self.frames.codes]
+            matrices = column(np.array([np.array(m) for m in stack]))
+            if not np.array_equal(matrices.max(axis=0), matrices.min(axis=0)):
+                return matrices, resets
+            return matrices[0], resets
+        return column(xformable.GetLocalTransformation(self.frames.first)), resets
+
+    def _content(self, prim: Usd.Prim, compiled: Prim) -> None:
+        """What the prim itself is: a mesh, a light, a camera, or something without a carrier."""
+        path = prim.GetPath()
+        kind = str(prim.GetTypeName())
+        geometry_light = self._geometry_lights.get(str(path))
+        if prim.IsA(UsdGeom.Mesh) or kind in gprims.TYPES:
+            compiled.mesh = self.meshes.read(prim)
+            light_prim = geometry_light or prim
+            if compiled.mesh is not None and light_type(light_prim) is not None:
+                compiled.light = self._light(light_prim, "MeshLight")
+                self._lit_geometry.add(str(path))
+        elif prim.IsA(UsdGeom.Camera):
+            compiled.camera = read_camera(prim, self.frames, self.meters_per_unit, self.report)
+        elif kind == "GeometryLight":
+            if not prim.GetRelationship("geometry").GetTargets():
+                self.report.warn(path, "GeometryLight emits nothing", "its geometry relationship is empty")
+        elif light_type(prim) is not None:
+            compiled.light = self._light(prim, light_type(prim))
+        elif prim.IsA(UsdLux.LightFilter):
+            self.report.warn(path, kind, "light filters have no carrier")
+        elif prim.IsA(UsdGeom.Gprim) or kind in ("Skeleton", "Volume"):
+            self.report.warn(path, kind, "this kind of geometry has no carrier; it is left out")
+        elif kind and not prim.GetPrimTypeInfo().GetSchemaType():
+            self.report.warn(path, f"unknown type {kind}", "no schema is registered for it")
+
+    def _light(self, prim: Usd.Prim, kind: str) -> Light:
+        """The light read once for all instances that share its prim."""
+        source = prim.GetPrimInPrototype() if prim.IsInstanceProxy() else prim
+        key = (str(source.GetPath()), kind)
+        if key not in self._lights:
+            self._lights[key] = read_light(prim, kind, self.frames, self.report)
+        return self._lights[key]
+
+    @staticmethod
+    def _turn_dome(compiled: Prim) -> None:
+        """Turn a dome to its pole axis, but not what is below it."""
+        compiled.local = compiled.local @ _POLE_Z
+        for child in compiled.children:
+            child.local = _POLE_Z.T @ child.local
+
+    def _instances(self, prim: Usd.Prim, compiled: Prim) -> None:
+        """The prototypes of a PointInstancer and where they are put."""
+        path = str(prim.GetPath())
+        targets = UsdGeom.PointInstancer(prim).GetPrototypesRel().GetForwardedTargets()
+        for number, placements in read_placements(prim, self.frames, self.report).items():
+            if number < 0 or number >= len(targets):
+                why = f"protoIndices name {number}, but there are {len(targets)} prototypes; they are left out"
+                self.report.warn(path, "instances without a prototype", why)
+                continue
+            prototype = self._prototype(str(targets[number]), path)
+            if prototype is not None:
+                compiled.instances.append((prototype, placements))
+                self.report.count("instances", len(placements.numbers))
+
+    def _prototype(self, target: str, instancer: str) -> Prim | None:
+        """A prototype compiled once, by itself: what is above it does not hide it."""
+        if target in self._open:
+            self.report.warn(instancer, "PointInstancer inside its own prototype", f"{target} is left out there")
+            return None
+        if target not in self._prototypes:
+            prim = self.stage.GetPrimAtPath(target)
+            if not prim:
+                why = f"there is no prim {target}; its instances are left out"
+                self.report.warn(instancer, "missing prototype", why)
+                return None
+            self._open.add(target)
+            self._prototypes[target] = self._compile(prim, None, PROTOTYPE_PREDICATE)
+            self._open.discard(target)
+        return self._prototypes[target]

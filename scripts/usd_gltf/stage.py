@@ -1,0 +1,143 @@
+"""Opening a stage: payloads, variants, the frames to export, and what composition complained of."""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from pxr import Sdf, Tf, Usd, UsdGeom
+
+from .report import ExportError, Report
+
+PREDICATE = Usd.TraverseInstanceProxies(
+    Usd.PrimIsActive & Usd.PrimIsDefined & Usd.PrimIsLoaded & ~Usd.PrimIsAbstract
+)
+"""What of a stage is scene: the default predicate, with the insides of instances."""
+
+PROTOTYPE_PREDICATE = Usd.TraverseInstanceProxies(Usd.PrimIsActive & Usd.PrimIsLoaded)
+"""What of a PointInstancer's prototype is scene: it may be an `over` or a `class`."""
+
+
+@dataclass(frozen=True)
+class Options:
+    """The user's choices that change the exported file."""
+
+    frames: tuple[int, int] | None = None
+    variants: tuple[tuple[str, str, str], ...] = ()
+    purposes: tuple[str, ...] = ("default", "render")
+    normalize_area: str = "stage"
+
+
+@dataclass(frozen=True)
+class Frames:
+    """The time codes that are exported, one key each."""
+
+    codes: tuple[float, ...]
+    codes_per_second: float
+
+    @property
+    def first(self) -> float:
+        """The frame that static values are read at."""
+        return self.codes[0]
+
+    @property
+    def seconds(self) -> np.ndarray:
+        """glTF times: `(timeCode - startTimeCode) / timeCodesPerSecond`."""
+        return (np.array(self.codes) - self.codes[0]) / self.codes_per_second
+
+
+def first_line(error: Exception, path: Path) -> str:
+    """The one line of a Tf exception that says what is wrong in `path`."""
+    text = str(error)
+    messages = re.findall(r"in file \S+ : '(.*?)'?\s*(?=\n\tError in|\Z)", text, re.DOTALL)
+    line = " ".join((messages or [text])[0].split()) or type(error).__name__
+    line = re.sub(r"parse error matching .*(?= at ')", "parse error", line)
+    return line.removeprefix(str(path)).removeprefix(":")
+
+
+def changes(attribute: Usd.Attribute, frames: Frames) -> bool:
+    """Whether the attribute's value differs between two of the frames."""
+    if not attribute or not attribute.ValueMightBeTimeVarying() or len(frames.codes) < 2:
+        return False
+    first = attribute.Get(frames.first)
+    return any(attribute.Get(code) != first for code in frames.codes[1:])
+
+
+def open_stage(path: Path, options: Options, report: Report) -> Usd.Stage:
+    """Open with all payloads, set the variants, and report what did not compose."""
+    if not path.is_file():
+        raise ExportError(f"{path}: no such file")
+    try:
+        stage = Usd.Stage.Open(str(path), Usd.Stage.LoadAll)
+    except (Tf.ErrorException, RuntimeError) as error:
+        raise ExportError(f"{path}: USD cannot read it: {first_line(error, path)}") from None
+    for prim_path, variant_set, selection in options.variants:
+        _select_variant(stage, path, prim_path, variant_set, selection)
+    for error in stage.GetCompositionErrors():
+        text = " ".join(str(error).split())
+        kind = "missing layer" if "Could not open asset" in text else "composition error"
+        if kind == "missing layer" and "for payload" in text:
+            kind = "missing payload"
+        report.warn(error.rootSite.path, kind, text)
+    return stage
+
+
+def _select_variant(stage: Usd.Stage, file: Path, prim_path: str, name: str, selection: str) -> None:
+    """Select a variant in the session layer."""
+    prim = stage.GetPrimAtPath(prim_path) if Sdf.Path.IsValidPathString(prim_path) else None
+    if not prim:
+        raise ExportError(f"{file}: --variant: there is no prim {prim_path}")
+    if name not in prim.GetVariantSets().GetNames():
+        known = ", ".join(prim.GetVariantSets().GetNames()) or "none"
+        raise ExportError(f"{file}: --variant: {prim_path} has no variant set '{name}' (it has: {known})")
+    variant_set = prim.GetVariantSet(name)
+    if selection not in variant_set.GetVariantNames():
+        known = ", ".join(variant_set.GetVariantNames())
+        raise ExportError(f"{file}: --variant: {prim_path}{{{name}}} has no '{selection}' (it has: {known})")
+    with Usd.EditContext(stage, stage.GetSessionLayer()):
+        variant_set.SetVariantSelection(selection)
+
+
+def choose_frames(stage: Usd.Stage, options: Options, report: Report) -> Frames:
+    """The frames asked for, else the stage's own range, else the range of its time samples."""
+    per_second = stage.GetTimeCodesPerSecond()
+    if not (math.isfinite(per_second) and per_second > 0):
+        report.warn("/", "timeCodesPerSecond is not positive", f"it is {per_second}; 24 is used")
+        per_second = 24.0
+    if options.frames is not None:
+        start, end = map(float, options.frames)
+    elif stage.HasAuthoredTimeCodeRange():
+        start, end = stage.GetStartTimeCode(), stage.GetEndTimeCode()
+    else:
+        start, end = _sampled_range(stage)
+        if end > start:
+            why = f"frames {start:g}-{end:g} are taken from the time samples; say --frames to choose"
+            report.warn("/", "no startTimeCode and endTimeCode", why)
+    if not (math.isfinite(start) and math.isfinite(end)) or end < start:
+        report.warn("/", "startTimeCode and endTimeCode are no range", f"{start:g}-{end:g}; the first is used")
+        start = end = start if math.isfinite(start) else 0.0
+    if end - start > 1_000_000:
+        raise ExportError(f"frames {start:g}-{end:g} are more than a million: say --frames FIRST-LAST")
+    codes = [start + step for step in range(int(end - start) + 1)]
+    if codes[-1] < end:
+        codes.append(end)
+    return Frames(tuple(codes), per_second)
+
+
+def _sampled_range(stage: Usd.Stage) -> tuple[float, float]:
+    """Whole frames around all time samples of things that the export can animate."""
+    low, high = math.inf, -math.inf
+    for prim in Usd.PrimRange(stage.GetPseudoRoot(), PREDICATE):
+        if not prim.IsA(UsdGeom.Xformable):
+            continue
+        for attribute in prim.GetAuthoredAttributes():
+            if attribute.ValueMightBeTimeVarying():
+                samples = attribute.GetTimeSamples()
+                if samples:
+                    low, high = min(low, samples[0]), max(high, samples[-1])
+    if not (math.isfinite(low) and math.isfinite(high)):
+        return 0.0, 0.0
+    return float(math.floor(low)), float(math.ceil(high))

@@ -1,0 +1,195 @@
+"""Exports small stages in this process and reads the glTF back."""
+
+import json
+import os
+import struct
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT / "scripts"))
+
+from usd_gltf.cli import main  # noqa: E402
+
+_COMPONENTS = {5126: np.float32, 5125: np.uint32, 5123: np.uint16}
+_WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
+
+
+@dataclass
+class Export:
+    """What one run of the exporter left behind."""
+
+    code: int
+    out: str
+    err: str
+    path: Path
+    report_path: Path
+
+    @property
+    def report(self) -> dict:
+        return json.loads(self.report_path.read_text())
+
+    def warned(self) -> set[str]:
+        return {warning["what"] for warning in self.report["warnings"]}
+
+
+class Gltf:
+    """A glTF file read plainly: nodes by USD path, accessors as arrays, world matrices."""
+
+    def __init__(self, path: Path) -> None:
+        data = path.read_bytes()
+        if data[:4] == b"glTF":
+            (length,) = struct.unpack_from("<I", data, 12)
+            self.json = json.loads(data[20 : 20 + length])
+            self.buffer = data[28 + length :]
+        else:
+            self.json = json.loads(data)
+            uri = self.json.get("buffers", [{}])[0].get("uri")
+            self.buffer = (path.parent / uri).read_bytes() if uri else b""
+        self.nodes = self.json.get("nodes", [])
+        self.parents = {c: i for i, n in enumerate(self.nodes) for c in n.get("children", [])}
+        self.by_path = {n["extras"]["usdPath"]: i for i, n in enumerate(self.nodes) if "extras" in n}
+
+    def node(self, path: str) -> dict:
+        return self.nodes[self.by_path[path]]
+
+    def lux(self, path: str) -> dict:
+        return self.node(path)["extras"]["usdLux"]
+
+    def light(self, path: str) -> dict:
+        index = self.node(path)["extensions"]["KHR_lights_punctual"]["light"]
+        return self.json["extensions"]["KHR_lights_punctual"]["lights"][index]
+
+    def primitives(self, path: str) -> list[dict]:
+        return self.json["meshes"][self.node(path)["mesh"]]["primitives"]
+
+    def material(self, path: str, primitive: int = 0) -> dict:
+        return self.json["materials"][self.primitives(path)[primitive]["material"]]
+
+    def nits(self, path: str, primitive: int = 0) -> np.ndarray:
+        material = self.material(path, primitive)
+        strength = material.get("extensions", {}).get("KHR_materials_emissive_strength", {})
+        factor = np.array(material.get("emissiveFactor", [0.0] * 3))
+        assert (factor <= 1).all()
+        return factor * strength.get("emissiveStrength", 1.0)
+
+    def accessor(self, index: int) -> np.ndarray:
+        accessor = self.json["accessors"][index]
+        view = self.json["bufferViews"][accessor["bufferView"]]
+        width = _WIDTHS[accessor["type"]]
+        array = np.frombuffer(
+            self.buffer, _COMPONENTS[accessor["componentType"]], accessor["count"] * width, view["byteOffset"]
+        )
+        return array.reshape(-1, width) if width > 1 else array
+
+    def attribute(self, path: str, name: str, primitive: int = 0) -> np.ndarray:
+        return self.accessor(self.primitives(path)[primitive]["attributes"][name])
+
+    def triangles(self, path: str, primitive: int = 0) -> np.ndarray:
+        """Local corner positions (t, 3, 3)."""
+        indices = self.accessor(self.primitives(path)[primitive]["indices"]).reshape(-1, 3)
+        return self.attribute(path, "POSITION", primitive)[indices].astype(float)
+
+    def area_vectors(self, path: str, primitive: int = 0) -> np.ndarray:
+        corners = self.triangles(path, primitive)
+        return np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]) / 2
+
+    def area(self, path: str) -> float:
+        """World-space area in square metres."""
+        linear = self.world(path)[:3, :3]
+        total = 0.0
+        for primitive in range(len(self.primitives(path))):
+            corners = self.triangles(path, primitive) @ linear.T
+            cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+            total += np.linalg.norm(cross, axis=1).sum() / 2
+        return total
+
+    def world(self, path: str) -> np.ndarray:
+        index, matrix = self.by_path[path], np.eye(4)
+        while index is not None:
+            matrix = local_matrix(self.nodes[index]) @ matrix
+            index = self.parents.get(index)
+        return matrix
+
+    def channels(self, path: str) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+        found = {}
+        for animation in self.json.get("animations", []):
+            for channel in animation["channels"]:
+                if channel["target"]["node"] == self.by_path[path]:
+                    sampler = animation["samplers"][channel["sampler"]]
+                    assert sampler["interpolation"] == "LINEAR"
+                    found[channel["target"]["path"]] = (
+                        self.accessor(sampler["input"]),
+                        self.accessor(sampler["output"]),
+                    )
+        return found
+
+
+def local_matrix(node: dict) -> np.ndarray:
+    x, y, z, w = node.get("rotation", (0, 0, 0, 1))
+    rotation = np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+    matrix = np.eye(4)
+    matrix[:3, :3] = rotation * np.array(node.get("scale", (1, 1, 1)))
+    matrix[:3, 3] = node.get("translation", (0, 0, 0))
+    return matrix
+
+
+@pytest.fixture
+def export(tmp_path, capsys):
+    """`export(usda_or_path, *arguments, out=...)` runs the exporter; text becomes scene.usda."""
+
+    def run(source, *arguments: str, out: str = "scene.glb") -> Export:
+        if isinstance(source, str):
+            text = source if source.startswith("#usda") else HEADER + source
+            source = tmp_path / "scene.usda"
+            # A statement must end before the brace: lets tests write one-line prims.
+            source.write_text(text.replace("}", "\n}"))
+        output = tmp_path / out
+        try:
+            code = main([str(source), str(output), *arguments])
+        except SystemExit as stop:
+            code = stop.code
+        captured = capsys.readouterr()
+        report = output.with_name(output.name + ".report.json")
+        return Export(code, captured.out, captured.err, output, report)
+
+    return run
+
+
+@pytest.fixture
+def gltf(export):
+    """The same, read back; the export must succeed."""
+
+    def run(source, *arguments: str, out: str = "scene.glb") -> Gltf:
+        result = export(source, *arguments, out=out)
+        assert result.code == 0, result.err
+        return Gltf(result.path)
+
+    return run
+
+
+@pytest.fixture
+def shared() -> Path:
+    """The folder of real inputs, if it is here."""
+    folder = Path(os.environ.get("CANDELABRA_SHARED", ROOT.parent / "shared"))
+    if not folder.is_dir():
+        pytest.skip("no folder of real inputs (CANDELABRA_SHARED)")
+    return folder
+
+
+HEADER = """#usda 1.0
+(
+    metersPerUnit = 1
+    upAxis = "Y"
+)
+"""

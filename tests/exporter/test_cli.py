@@ -1,0 +1,181 @@
+"""Exit codes, reports, strictness, no-ops, determinism, and broken input."""
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+
+import pytest
+from conftest import ROOT, Gltf
+
+LAMP = 'def RectLight "L" { float inputs:intensity = 5 }'
+
+
+def test_the_script_runs_by_itself(tmp_path):
+    source = tmp_path / "a.usda"
+    source.write_text('#usda 1.0\ndef SphereLight "L" {}\n')
+    command = [sys.executable, str(ROOT / "scripts" / "usd_to_gltf.py"), str(source), str(tmp_path / "a.glb")]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "a.glb: written" in done.stdout
+    again = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert again.returncode == 0 and "up to date" in again.stdout
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [["--frames", "5-1"], ["--frames", "1-10:2"], ["--purpose", "prxy"], ["--normalize-area", "foot"], ["--nonsense"]],
+)
+def test_usage_errors_exit_2(export, arguments):
+    assert export(LAMP, *arguments).code == 2
+
+
+def test_the_output_must_be_gltf(export):
+    assert export(LAMP, out="scene.obj").code == 2
+
+
+def test_nothing_to_do_when_up_to_date(export, tmp_path):
+    first = export(LAMP)
+    written = first.path.stat().st_mtime_ns
+    again = export(LAMP)
+    assert again.code == 0 and "up to date" in again.out
+    assert again.path.stat().st_mtime_ns == written
+    # Another option, another source, a lost report: each is work to do.
+    assert "written" in export(LAMP, "--normalize-area", "metre").out
+    assert "written" in export(LAMP.replace("5", "6")).out
+    again.report_path.unlink()
+    assert "written" in export(LAMP.replace("5", "6")).out
+
+
+def test_a_layer_or_a_texture_that_changes_is_noticed(export, tmp_path):
+    from PIL import Image
+
+    (tmp_path / "lib.usda").write_text('#usda 1.0\ndef Xform "Lib" {\n def RectLight "L" {\n asset inputs:texture:file = @t.png@\n}\n}\n')
+    Image.new("RGB", (2, 2), (1, 2, 3)).save(tmp_path / "t.png")
+    text = 'def "A" (references = @lib.usda@</Lib>) {}'
+    assert "written" in export(text).out
+    assert "up to date" in export(text).out
+    Image.new("RGB", (2, 2), (3, 2, 1)).save(tmp_path / "t.png")
+    assert "written" in export(text).out
+    with (tmp_path / "lib.usda").open("a") as layer:
+        layer.write("# edited\n")
+    assert "written" in export(text).out
+
+
+def test_same_input_same_bytes(export, tmp_path):
+    text = 'def SphereLight "B" {}\n' + LAMP + '\ndef Cube "C" {}\ndef Sphere "S" {}'
+    first = export(text).path.read_bytes()
+    # In a fresh process, where hashes and addresses differ.
+    command = [sys.executable, str(ROOT / "scripts" / "usd_to_gltf.py"), str(tmp_path / "scene.usda"), str(tmp_path / "b.glb")]
+    environment = {**os.environ, "PYTHONHASHSEED": "7"}
+    subprocess.run(command, check=True, capture_output=True, env=environment)
+    assert (tmp_path / "b.glb").read_bytes() == first
+
+
+def test_strict_writes_the_report_and_nothing_else(export):
+    text = LAMP + '\ndef PluginLight "P" {}'
+    result = export(text, "--strict")
+    assert result.code == 1
+    assert not result.path.exists()
+    assert result.report["warnings"][0]["path"] == "/P"
+    assert "--strict" in result.err
+    assert export(text).code == 0
+    assert export(text, "--strict").code == 1, "an up-to-date output is no excuse"
+    assert export(LAMP, "--strict").code == 0
+
+
+def test_the_report(export, tmp_path):
+    result = export(LAMP + "".join(f'\ndef PluginLight "P{i}" {{}}' for i in range(500)), "--report", str(tmp_path / "r.json"))
+    report = json.loads((tmp_path / "r.json").read_text())
+    assert set(report) >= {"source", "output", "warnings", "counts"}
+    assert set(report["warnings"][0]) == {"path", "what", "why"}
+    assert report["counts"]["lights RectLight"] == 1
+    assert len(report["warnings"]) == 500
+    assert len(result.err.splitlines()) == 1 and "500" in result.err
+
+
+def test_a_missing_payload_is_named_and_an_error_under_strict(export):
+    text = LAMP + '\ndef Xform "Hall" (payload = @gone/hall.usd@) {}'
+    result = export(text)
+    assert result.code == 0
+    (warning,) = [w for w in result.report["warnings"] if w["what"] == "missing payload"]
+    assert warning["path"] == "/Hall" and "gone/hall.usd" in warning["why"]
+    assert export(text, "--strict").code == 1
+
+
+def test_a_missing_source_is_one_line(export, tmp_path):
+    result = export(tmp_path / "nowhere.usd")
+    assert result.code == 1
+    assert result.err == f"error: {tmp_path / 'nowhere.usd'}: no such file\n"
+
+
+def test_an_unwritable_output_is_one_line(export, tmp_path):
+    (tmp_path / "file").write_text("")
+    result = export(LAMP, out="file/scene.glb")
+    assert result.code == 1
+    assert len(result.err.splitlines()) == 1 and result.err.startswith("error: ")
+
+
+def test_an_empty_stage_is_an_empty_scene(gltf):
+    assert gltf("").json["nodes"] == [{"name": "stage"}]
+
+
+def test_output_leaves_no_temporary_files(export, tmp_path):
+    export(LAMP)
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["scene.glb", "scene.glb.report.json", "scene.usda"]
+
+
+def test_malformed_usd_is_refused_in_one_line_or_exported(export, shared):
+    folder = shared / "real" / "malformed"
+    files = sorted(p for p in folder.glob("usd_*/**/*") if p.suffix in (".usd", ".usda", ".usdc", ".usdz"))
+    assert files
+    refused = 0
+    for file in files:
+        result = export(file, out=f"{file.stem}.glb")
+        assert result.code in (0, 1)
+        if result.code == 1:
+            refused += 1
+            assert result.err.startswith(f"error: {file}: ")
+            assert len(result.err.splitlines()) == 1
+            assert not result.path.exists()
+    assert refused >= 20
+
+
+@pytest.mark.parametrize(
+    ("name", "lights"),
+    [
+        ("openusd_usdlux_tests/usd/usdLux/testenv/testUsdLuxLightListAPI/root_with_instances.usda", 3),
+        ("usdwg_standard_shader_ball/standard_shader_ball_scene.usda", 5),
+    ],
+)
+def test_real_stages(gltf, shared, name, lights):
+    scene = gltf(shared / "real" / name)
+    assert sum("usdLux" in node.get("extras", {}) for node in scene.nodes) == lights
+
+
+def test_the_khronos_validator_finds_no_errors(gltf, export, tmp_path):
+    """Needs GLTF_VALIDATOR, the path of the npm package gltf-validator, and node."""
+    package = os.environ.get("GLTF_VALIDATOR")
+    if not package or not shutil.which("node"):
+        pytest.skip("no gltf-validator (GLTF_VALIDATOR)")
+    result = export(
+        """def SphereLight "S" { color3f inputs:color = (1, 0.5, 0) }
+        def DiskLight "D" { bool inputs:normalize = 1 }
+        def CylinderLight "C" {}
+        def DistantLight "Sun" {}
+        def DomeLight "Dome" {}
+        def Cone "G" { color3f[] primvars:displayColor = [(1, 0, 0)] }
+        def Camera "Cam" {}"""
+    )
+    assert Gltf(result.path).nodes
+    script = (
+        "const v=require(process.argv[1]),fs=require('fs');"
+        "v.validateBytes(new Uint8Array(fs.readFileSync(process.argv[2])))"
+        ".then(r=>console.log(JSON.stringify(r.issues)))"
+    )
+    done = subprocess.run(
+        ["node", "-e", script, package, str(result.path)], capture_output=True, text=True, check=True
+    )
+    issues = json.loads(done.stdout)
+    assert (issues["numErrors"], issues["numWarnings"]) == (0, 0), issues["messages"]

@@ -1,0 +1,288 @@
+"""UsdLux's formulas, carriers, areas and orientations."""
+
+import math
+
+import numpy as np
+import pytest
+
+CM_Z_UP = '#usda 1.0\n(\n    metersPerUnit = 0.01\n    upAxis = "Z"\n)\n'
+
+
+def test_the_default_sun_gives_3_3602_lux(gltf):
+    scene = gltf('def DistantLight "Sun" {}')
+    assert scene.light("/Sun")["type"] == "directional"
+    assert scene.light("/Sun")["intensity"] == pytest.approx(3.3602, abs=5e-5)
+    assert scene.lux("/Sun")["angle"] == pytest.approx(0.53)
+
+
+@pytest.mark.parametrize(
+    ("angle", "normalize", "lux"),
+    [
+        (0, 0, 7.0),
+        (0, 1, 7.0),
+        (10, 0, 7 * math.pi * math.sin(math.radians(5)) ** 2),
+        (10, 1, 7.0),
+        (180, 0, 7 * math.pi),
+        (270, 1, 7 / (2 - math.sin(math.radians(135)) ** 2)),
+    ],
+)
+def test_suns(gltf, angle, normalize, lux):
+    scene = gltf(
+        f'def DistantLight "Sun" {{ float inputs:angle = {angle}\n float inputs:intensity = 7\n'
+        f" bool inputs:normalize = {normalize} }}"
+    )
+    assert scene.light("/Sun")["intensity"] == pytest.approx(lux, rel=1e-6)
+
+
+def test_intensity_exposure_color_and_temperature_multiply(gltf):
+    scene = gltf(
+        """def RectLight "L" {
+            float inputs:intensity = 3
+            float inputs:exposure = 2
+            color3f inputs:color = (1, 0.5, 0.25)
+            bool inputs:enableColorTemperature = 1
+            float inputs:colorTemperature = 3200
+        }"""
+    )
+    # 1.6799, .8660, .3256 is UsdLux's blackbody at 3200 K.
+    expected = 12 * np.array([1.6799, 0.8660 * 0.5, 0.3256 * 0.25])
+    assert scene.nits("/L") == pytest.approx(expected, rel=2e-4)
+    assert scene.lux("/L")["inputs"]["colorTemperature"] == 3200
+
+
+def test_6500_kelvin_is_what_the_code_says_not_white(gltf):
+    scene = gltf('def RectLight "L" { bool inputs:enableColorTemperature = 1 }')
+    assert scene.nits("/L") == pytest.approx([1.0433, 0.9836, 1.0346], abs=1e-4)
+
+
+AREAS = {
+    "RectLight": ("float inputs:width = 2\n float inputs:height = 3", 6.0),
+    "DiskLight": ("float inputs:radius = 2", 4 * math.pi),
+    "SphereLight": ("float inputs:radius = 2", 16 * math.pi),
+    "CylinderLight": ("float inputs:radius = 2\n float inputs:length = 3", 12 * math.pi),
+}
+
+
+@pytest.mark.parametrize("kind", AREAS)
+@pytest.mark.parametrize("scale", [0.5, 1.0, 20.0])
+def test_tessellations_have_the_lights_area(gltf, kind, scale):
+    inputs, area = AREAS[kind]
+    scene = gltf(f'def {kind} "L" {{ {inputs}\n float3 xformOp:scale = ({scale}, {scale}, {scale})\n'
+                 ' uniform token[] xformOpOrder = ["xformOp:scale"] }')  # fmt: skip
+    assert scene.area("/L") == pytest.approx(area * scale**2, rel=1e-5)
+
+
+@pytest.mark.parametrize("kind", AREAS)
+@pytest.mark.parametrize("scale", [0.5, 20.0])
+@pytest.mark.parametrize(("unit", "divisor"), [("stage", 1.0), ("metre", 1e-4)])
+def test_normalize_divides_by_the_world_area(gltf, kind, scale, unit, divisor):
+    inputs, area = AREAS[kind]
+    scene = gltf(
+        CM_Z_UP + f'def {kind} "L" {{ {inputs}\n float inputs:intensity = 5\n bool inputs:normalize = 1\n'
+        f" float3 xformOp:scale = ({scale}, {scale}, {scale})\n"
+        ' uniform token[] xformOpOrder = ["xformOp:scale"] }',
+        "--normalize-area",
+        unit,
+    )
+    expected = 5 / (area * scale**2 * divisor)
+    assert scene.nits("/L") == pytest.approx([expected] * 3, rel=1e-6)
+
+
+def test_normalize_counts_a_non_uniform_scale(gltf):
+    scene = gltf(
+        """def SphereLight "L" {
+            float inputs:radius = 1
+            bool inputs:normalize = 1
+            float3 xformOp:scale = (1, 1, 3)
+            uniform token[] xformOpOrder = ["xformOp:scale"]
+        }"""
+    )
+    # A prolate spheroid: 2 pi a^2 (1 + c/(a e) asin e).
+    e = math.sqrt(1 - 1 / 9)
+    area = 2 * math.pi * (1 + 3 / e * math.asin(e))
+    assert scene.nits("/L") == pytest.approx([1 / area] * 3, rel=1e-7)
+
+
+def test_flat_lights_face_minus_z_and_round_ones_outward(gltf):
+    scene = gltf(
+        'def RectLight "Rect" {}\ndef DiskLight "Disk" {}\ndef SphereLight "Ball" {}\ndef CylinderLight "Tube" {}'
+    )
+    for path in ("/Rect", "/Disk"):
+        assert (scene.area_vectors(path)[:, 2] < 0).all()
+        assert scene.attribute(path, "NORMAL") == pytest.approx(
+            np.tile([0, 0, -1], (len(scene.attribute(path, "NORMAL")), 1))
+        )
+    for path in ("/Ball", "/Tube"):
+        centres = scene.triangles(path).mean(axis=1)
+        centres[:, 0] *= path == "/Ball"
+        assert (np.einsum("ti,ti->t", centres, scene.area_vectors(path)) > 0).all()
+    assert np.abs(scene.area_vectors("/Tube")[:, 0]).max() < 1e-7, "no end caps"
+
+
+def test_a_light_is_black_and_only_emits(gltf):
+    material = gltf('def RectLight "L" { float inputs:intensity = 100 }').material("/L")
+    assert material["pbrMetallicRoughness"]["baseColorFactor"] == [0, 0, 0, 1]
+    assert material["pbrMetallicRoughness"]["metallicFactor"] == 0
+    assert material["pbrMetallicRoughness"]["roughnessFactor"] == 1
+    assert material["extensions"]["KHR_materials_specular"] == {"specularFactor": 0}
+    assert material["extensions"]["KHR_materials_emissive_strength"] == {"emissiveStrength": 100}
+
+
+def test_treat_as_point_is_candela(gltf):
+    scene = gltf(
+        CM_Z_UP + """def SphereLight "L" {
+            bool inputs:treatAsPoint = 1
+            float inputs:radius = 20
+            float inputs:intensity = 1000
+        }"""
+    )
+    assert scene.light("/L")["type"] == "point"
+    assert scene.light("/L")["intensity"] == pytest.approx(1000 * math.pi * 0.2**2, rel=1e-6)
+    assert "mesh" not in scene.node("/L")
+
+
+@pytest.mark.parametrize("radius", [0, 0.001, 4])
+@pytest.mark.parametrize(("unit", "factor"), [("stage", 1e-4), ("metre", 1.0)])
+def test_a_normalized_point_has_a_quarter_of_its_intensity_whatever_its_radius(gltf, radius, unit, factor):
+    scene = gltf(
+        CM_Z_UP + f'def SphereLight "L" {{ bool inputs:treatAsPoint = 1\n float inputs:radius = {radius}\n'
+        " float inputs:intensity = 8\n bool inputs:normalize = 1 }",
+        "--normalize-area",
+        unit,
+    )
+    assert scene.light("/L")["intensity"] == pytest.approx(2 * factor, rel=1e-6)
+
+
+def test_a_sphere_without_radius_or_normalize_emits_nothing_and_says_so(export):
+    result = export('def SphereLight "L" { float inputs:radius = 0 }')
+    assert result.code == 0
+    assert "SphereLight emits nothing" in result.warned()
+
+
+def test_a_normalized_flat_light_without_size_keeps_its_cosine(gltf):
+    scene = gltf('def DiskLight "L" { float inputs:radius = 0\n bool inputs:normalize = 1\n float inputs:intensity = 6 }')
+    assert scene.light("/L")["type"] == "spot"
+    assert scene.light("/L")["intensity"] == pytest.approx(6)
+    assert scene.lux("/L")["shaping"] == {
+        "coneAngle": 90, "coneSoftness": 0, "focus": 1, "focusTint": [0, 0, 0]
+    }  # fmt: skip
+
+
+def test_a_shaped_point_is_a_spot_with_its_usd_shaping(gltf):
+    scene = gltf(
+        """def SphereLight "L" (prepend apiSchemas = ["ShapingAPI"]) {
+            bool inputs:treatAsPoint = 1
+            float inputs:shaping:cone:angle = 40
+            float inputs:shaping:cone:softness = 0.25
+            float inputs:shaping:focus = 2
+        }"""
+    )
+    spot = scene.light("/L")["spot"]
+    assert spot["outerConeAngle"] == pytest.approx(math.radians(40))
+    assert spot["innerConeAngle"] == pytest.approx(math.radians(30))
+    assert scene.lux("/L")["shaping"] == {
+        "coneAngle": 40, "coneSoftness": 0.25, "focus": 2, "focusTint": [0, 0, 0]
+    }  # fmt: skip
+
+
+def test_a_sphere_keeps_its_local_radius(gltf):
+    assert gltf('def SphereLight "L" { float inputs:radius = 0.3 }').lux("/L")["radius"] == pytest.approx(0.3)
+
+
+def test_domes_keep_radiance_and_texture_beside(gltf, tmp_path):
+    (tmp_path / "src").mkdir()
+    source = tmp_path / "src" / "dome.usda"
+    source.write_text(
+        '#usda 1.0\ndef DomeLight "Sky" { float inputs:intensity = 2\n asset inputs:texture:file = @sky map.hdr@\n}'
+    )
+    (tmp_path / "src" / "sky map.hdr").write_bytes(b"#?RADIANCE\n")
+    scene = gltf(source, out="out.glb")
+    assert scene.lux("/Sky")["radiance"] == [2, 2, 2]
+    assert scene.lux("/Sky")["texture"] == "out_textures/sky_map.hdr"
+    assert (tmp_path / "out_textures" / "sky_map.hdr").read_bytes() == b"#?RADIANCE\n"
+
+
+def test_dome_1_follows_its_pole(gltf):
+    scene = gltf('#usda 1.0\n(\n upAxis = "Z"\n metersPerUnit = 1\n)\ndef DomeLight_1 "Sky" {}\ndef DomeLight "Old" {}')
+    # The pole (local +Y) of a scene-oriented dome on a Z-up stage ends up along glTF's +Y;
+    # longitude 0 (local +Z) looks along the stage's -Y, which is glTF's +Z.
+    assert scene.world("/Sky")[:3, 1] == pytest.approx([0, 1, 0], abs=1e-6)
+    assert scene.world("/Sky")[:3, 2] == pytest.approx([0, 0, 1], abs=1e-6)
+    assert scene.world("/Old")[:3, 1] == pytest.approx([0, 0, -1], abs=1e-6)
+
+
+@pytest.mark.parametrize("bad", ["nan", "-1", "inf"])
+def test_bad_emission_is_reported_and_never_written(export, bad):
+    from conftest import Gltf
+
+    result = export(f'def RectLight "L" {{ float inputs:intensity = {bad} }}')
+    assert result.code == 0
+    assert "emission is negative or not finite" in result.warned()
+    assert "NaN" not in str(Gltf(result.path).json["materials"])
+
+
+def test_force_is_carried(gltf):
+    assert gltf('def RectLight "L" { custom bool candelabra:force = 1 }').lux("/L")["force"] is True
+
+
+def test_lights_without_a_carrier_are_reported(export):
+    from conftest import Gltf
+
+    result = export(
+        """def PortalLight "P" { float inputs:width = 2 }
+        def PluginLight "X" {}
+        def LightFilter "F" {}
+        def RectLight "Linked" {
+            uniform bool collection:lightLink:includeRoot = 0
+            float inputs:diffuse = 0.5
+            asset inputs:shaping:ies:file = @lamp.ies@
+            rel light:filters = </F>
+        }"""
+    )
+    assert {"PortalLight", "PluginLight", "LightFilter", "lightLink", "inputs:diffuse", "IES profile",
+            "light filters"} <= result.warned()  # fmt: skip
+    assert Gltf(result.path).lux("/P")["inputs"] == {"width": 2}
+
+
+def test_animated_light_values(gltf):
+    scene = gltf(
+        """#usda 1.0
+        (
+            startTimeCode = 1001
+            endTimeCode = 1003
+            timeCodesPerSecond = 24
+            metersPerUnit = 1
+            upAxis = "Y"
+        )
+        def RectLight "L" {
+            float inputs:intensity.timeSamples = { 1001: 1, 1003: 3 }
+        }
+        def RectLight "Same" {
+            float inputs:intensity.timeSamples = { 1001: 1, 1003: 1 }
+        }
+        def RectLight "Grows" {
+            bool inputs:normalize = 1
+            float3 xformOp:scale.timeSamples = { 1001: (1, 1, 1), 1003: (2, 2, 2) }
+            uniform token[] xformOpOrder = ["xformOp:scale"]
+        }"""
+    )
+    values = scene.lux("/L")["values"]
+    assert values["times"] == pytest.approx([0, 1 / 24, 2 / 24])
+    assert np.array(values["rgb"]) == pytest.approx(np.array([[1] * 3, [2] * 3, [3] * 3]))
+    assert "values" not in scene.lux("/Same")
+    grows = np.array(scene.lux("/Grows")["values"]["rgb"])[:, 0]
+    assert grows == pytest.approx([1, 1 / 2.25, 1 / 4])
+    assert scene.json["asset"]["extras"]["usd"]["startTimeCode"] == 1001
+
+
+def test_a_textured_rect_shows_its_picture_upright_from_the_front(gltf, tmp_path):
+    from PIL import Image
+
+    Image.new("RGB", (2, 2), (255, 0, 0)).save(tmp_path / "t.png")
+    scene = gltf('def RectLight "L" { asset inputs:texture:file = @t.png@ }')
+    uv = scene.attribute("/L", "TEXCOORD_0")
+    position = scene.attribute("/L", "POSITION")
+    # The first pixel (0, 0) at (+X, +Y), the last (1, 1) at (-X, -Y).
+    assert uv == pytest.approx(np.stack([0.5 - position[:, 0], 0.5 - position[:, 1]], axis=1))
+    assert "emissiveTexture" in scene.material("/L")
+    assert scene.json["images"][0]["mimeType"] == "image/png"

@@ -1,0 +1,104 @@
+"""Meshes that emit: MeshLightAPI, GeometryLight and light:materialSyncMode."""
+
+import pytest
+
+QUAD = """
+    int[] faceVertexCounts = [4]
+    int[] faceVertexIndices = [0, 1, 2, 3]
+    point3f[] points = [(0, 0, 0), (2, 0, 0), (2, 3, 0), (0, 3, 0)]
+    uniform token subdivisionScheme = "none"
+"""
+NEON = """
+def Material "Neon" {
+    token outputs:surface.connect = </Neon/S.outputs:surface>
+    def Shader "S" {
+        uniform token info:id = "UsdPreviewSurface"
+        color3f inputs:diffuseColor = (0.2, 0.3, 0.4)
+        color3f inputs:emissiveColor = (1, 0.5, 0)
+        token outputs:surface
+    }
+}
+"""
+BOUND = '["MeshLightAPI", "MaterialBindingAPI"]'
+
+
+def test_material_glow_tints_light(gltf):
+    scene = gltf(
+        NEON + f'def Mesh "M" (prepend apiSchemas = {BOUND}) {{ {QUAD} rel material:binding = </Neon>\n'
+        " float inputs:intensity = 10\n color3f inputs:color = (1, 1, 0.5) }"
+    )
+    assert scene.nits("/M") == pytest.approx([10, 5, 0])
+    assert scene.lux("/M")["type"] == "MeshLight"
+    assert scene.material("/M")["pbrMetallicRoughness"]["baseColorFactor"][:3] == pytest.approx([0.2, 0.3, 0.4])
+
+
+@pytest.mark.parametrize(("mode", "base"), [("independent", 0.2), ("noMaterialResponse", 0.0)])
+def test_other_sync_modes_take_the_lights_color(gltf, mode, base):
+    scene = gltf(
+        NEON + f'def Mesh "M" (prepend apiSchemas = {BOUND}) {{ {QUAD} rel material:binding = </Neon>\n'
+        f' uniform token light:materialSyncMode = "{mode}"\n color3f inputs:color = (0, 0, 1) }}'
+    )
+    assert scene.nits("/M") == pytest.approx([0, 0, 1])
+    assert scene.material("/M")["pbrMetallicRoughness"]["baseColorFactor"][0] == pytest.approx(base)
+
+
+def test_a_mesh_light_without_material_takes_the_lights_color(gltf):
+    scene = gltf(f'def Mesh "M" (prepend apiSchemas = ["MeshLightAPI"]) {{ {QUAD} float inputs:intensity = 4 }}')
+    assert scene.nits("/M") == pytest.approx([4] * 3)
+
+
+def test_normalize_divides_by_the_area_of_the_mesh(gltf):
+    scene = gltf(
+        f"""def Mesh "M" (prepend apiSchemas = ["MeshLightAPI"]) {{ {QUAD}
+            bool inputs:normalize = 1
+            float3 xformOp:scale = (2, 1, 1)
+            uniform token[] xformOpOrder = ["xformOp:scale"]
+        }}"""
+    )
+    assert scene.nits("/M") == pytest.approx([1 / 12] * 3)
+
+
+def test_double_sided_meshes_emit_from_both_sides(gltf):
+    scene = gltf(f'def Mesh "M" (prepend apiSchemas = ["MeshLightAPI"]) {{ {QUAD} uniform bool doubleSided = 1 }}')
+    assert scene.material("/M")["doubleSided"] is True
+
+
+def test_a_geometry_light_lights_its_mesh(gltf):
+    scene = gltf(f'def Mesh "M" {{ {QUAD} }}\ndef GeometryLight "G" {{ rel geometry = </M>\n float inputs:intensity = 7 }}')
+    assert scene.nits("/M") == pytest.approx([7] * 3)
+    assert scene.lux("/M")["type"] == "MeshLight"
+
+
+def test_subsets_glow_each_by_its_material(gltf):
+    scene = gltf(
+        NEON
+        + """def Mesh "M" (prepend apiSchemas = ["MeshLightAPI"]) {
+            int[] faceVertexCounts = [3, 3]
+            int[] faceVertexIndices = [0, 1, 2, 0, 2, 3]
+            point3f[] points = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)]
+            uniform token subdivisionScheme = "none"
+            def GeomSubset "Tube" (prepend apiSchemas = ["MaterialBindingAPI"]) {
+                uniform token elementType = "face"
+                uniform token familyName = "materialBind"
+                int[] indices = [1]
+                rel material:binding = </Neon>
+            }
+        }"""
+    )
+    first, second = scene.primitives("/M")
+    assert "extras" not in first
+    assert second["extras"]["usdPath"] == "/M/Tube"
+    assert scene.nits("/M", 0) == pytest.approx([1, 1, 1])
+    assert scene.nits("/M", 1) == pytest.approx([1, 0.5, 0])
+
+
+def test_instances_of_a_mesh_light_share_their_mesh(gltf):
+    scene = gltf(
+        f"""def "Lib" {{ def Mesh "M" (prepend apiSchemas = ["MeshLightAPI"]) {{ {QUAD} }} }}
+        def "A" (instanceable = true
+            references = </Lib>) {{}}
+        def "B" (instanceable = true
+            references = </Lib>) {{}}"""
+    )
+    assert scene.node("/A/M")["mesh"] == scene.node("/B/M")["mesh"]
+    assert scene.lux("/B/M")["type"] == "MeshLight"
