@@ -132,5 +132,9 @@ fn decode_exr(bytes: &[u8], object: &str, budget: &mut Budget) -> Result<Picture
 
 /// Light is neither negative nor infinite.
 fn radiance(value: f32) -> f32 {
-    if value.is_nan() { 0.0 } else { value.clamp(0.0, BRIGHTEST.max(value.min(f32::MAX))) }
+    match value {
+        f32::INFINITY => BRIGHTEST,
+        value if value > 0.0 => value,
+        _ => 0.0,
+    }
 }

@@ -49,9 +49,13 @@ impl File {
     /// Adds an accessor over new bytes and returns its number.
     pub fn array(&mut self, bytes: &[u8], component: u32, count: usize, shape: &str) -> usize {
         let view = self.view(bytes);
-        push(&mut self.json, "accessors", json!({
-            "bufferView": view, "componentType": component, "count": count, "type": shape,
-        }))
+        push(
+            &mut self.json,
+            "accessors",
+            json!({
+                "bufferView": view, "componentType": component, "count": count, "type": shape,
+            }),
+        )
     }
 
     /// Adds an accessor of floats.
@@ -78,9 +82,13 @@ impl File {
         let offset = self.data.len();
         self.data.extend(bytes);
         self.json["buffers"][0]["byteLength"] = json!(self.data.len());
-        push(&mut self.json, "bufferViews", json!({
-            "buffer": 0, "byteOffset": offset, "byteLength": bytes.len(),
-        }))
+        push(
+            &mut self.json,
+            "bufferViews",
+            json!({
+                "buffer": 0, "byteOffset": offset, "byteLength": bytes.len(),
+            }),
+        )
     }
 
     /// Adds a row to a table, which need not exist, and returns its number.

@@ -1,9 +1,7 @@
 //! One broken rule a file, and the object that the error names.
 
-#[path = "ingest/files.rs"]
-mod files;
-
-use files::{File, lamp};
+use crate::files;
+use crate::files::{File, lamp};
 use serde_json::json;
 
 /// Breaks one rule of the lamp; the error must name the object and speak of the problem.
@@ -216,10 +214,13 @@ fn animations_can_be_evaluated() {
         let input = f.times(times);
         let shape = if path == "rotation" { "VEC4" } else { "VEC3" };
         let output = f.floats(values, shape);
-        f.add("animations", json!({
-            "samplers": [{"input": input, "output": output, "interpolation": how}],
-            "channels": [{"sampler": 0, "target": {"node": 0, "path": path}}],
-        }));
+        f.add(
+            "animations",
+            json!({
+                "samplers": [{"input": input, "output": output, "interpolation": how}],
+                "channels": [{"sampler": 0, "target": {"node": 0, "path": path}}],
+            }),
+        );
     };
     refuses("animation 0", "do not ascend", |f| {
         animate(f, &[1.0, 1.0], &[0.0; 6], "translation", "LINEAR");

@@ -1,10 +1,6 @@
 //! Files that others collected because they broke something, and files broken here.
 
-#[path = "ingest/files.rs"]
-mod files;
-#[path = "ingest/shared.rs"]
-mod shared;
-
+use crate::{files, shared};
 use candelabra::ingest::load;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
@@ -195,18 +191,24 @@ fn rich() -> files::File {
     let times = file.times(&[0.0, 1.0]);
     let moves = file.floats(&[0.0, 0.0, 0.0, 1.0, 2.0, 3.0], "VEC3");
     let turns = file.floats(&[0.0, 0.0, 0.0, 1.0, 0.0, 1.0, 0.0, 0.0], "VEC4");
-    file.add("animations", json!({
-        "samplers": [{"input": times, "output": moves}, {"input": times, "output": turns}],
-        "channels": [
-            {"sampler": 0, "target": {"node": 0, "path": "translation"}},
-            {"sampler": 1, "target": {"node": 0, "path": "rotation"}},
-        ],
-    }));
+    file.add(
+        "animations",
+        json!({
+            "samplers": [{"input": times, "output": moves}, {"input": times, "output": turns}],
+            "channels": [
+                {"sampler": 0, "target": {"node": 0, "path": "translation"}},
+                {"sampler": 1, "target": {"node": 0, "path": "rotation"}},
+            ],
+        }),
+    );
     let places = file.floats(&[0.0, 0.0, 0.0, 5.0, 0.0, 0.0], "VEC3");
     file.light(json!({"type": "spot", "spot": {"outerConeAngle": 0.7}}));
-    file.add("nodes", json!({"mesh": 0, "extensions": {
-        "EXT_mesh_gpu_instancing": {"attributes": {"TRANSLATION": places}},
-    }}));
+    file.add(
+        "nodes",
+        json!({"mesh": 0, "extensions": {
+            "EXT_mesh_gpu_instancing": {"attributes": {"TRANSLATION": places}},
+        }}),
+    );
     file.add("cameras", json!({"type": "perspective", "perspective": {"yfov": 0.7}}));
     file.add("nodes", json!({"camera": 0, "children": [1]}));
     file.json["scenes"][0]["nodes"] = json!([0, 2]);
@@ -230,7 +232,8 @@ fn no_damage_to_a_file_is_fatal() {
     let obj = b"mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvn 0 0 1\no lamp\nusemtl a\n\
         f 1/1/1 2/1/1 3/1/1\nf -3//1 -2//1 -1//1\n"
         .to_vec();
-    std::fs::write(folder.path().join("a.mtl"), "newmtl a\nKe 1 1 1\nmap_Ke a.png\nNs 10\n").unwrap();
+    std::fs::write(folder.path().join("a.mtl"), "newmtl a\nKe 1 1 1\nmap_Ke a.png\nNs 10\n")
+        .unwrap();
     let seeds = [("scene.glb", rich.glb()), ("scene.gltf", text), ("scene.obj", obj)];
     let mut loaded = 0;
     for (name, bytes) in seeds {
