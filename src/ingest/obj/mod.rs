@@ -42,11 +42,8 @@ pub(super) fn load(path: &Path) -> Result<Scene, Fault> {
 
     let mut scene = Scene::default();
     let mut paths = PrimPaths::default();
-    let mut materials = Materials {
-        folder: &folder,
-        budget: Budget::for_file(bytes.len() as u64),
-        textures: vec![],
-    };
+    let mut materials =
+        Materials { folder: &folder, budget: Budget::for_pictures(), textures: HashMap::new() };
     let mut compiled: Vec<Option<u32>> = vec![None; rows.len()];
     for (i, model) in models.into_iter().enumerate() {
         let object = format!("object {i} {:?}", model.name);
