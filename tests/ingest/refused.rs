@@ -307,6 +307,7 @@ fn a_file_that_is_no_scene_says_so() {
         ("e.obj", b"\xFF\xFEv\0", "UTF-16"),
         ("f.obj", b"v 0 0 0\n", "holds no faces"),
         ("g.obj", b"v 0 0 0\nf 1 2 3\n", "cannot be parsed"),
+        ("j.obj", b"v 0 0 0\nvt 0 0\nf 1/-2 1/1 1/1\n", "out of range"),
         ("h.usda", b"#usda 1.0", "not read"),
         ("i.obj", b"\x7FELF\0\0\0", "not text"),
     ] {
