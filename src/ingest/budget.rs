@@ -1,23 +1,30 @@
-//! How much a file may ask for.
+//! How much memory a file may ask for.
 
 use super::error::Fault;
 
-/// What any file may ask for, however small it is.
-const FLOOR_BYTES: u64 = 1 << 30;
-
-/// What a file may ask for besides, for each byte it holds. Sharing and compression make honest
-/// files grow by less than this; a few hostile bytes that name one buffer a million times do not.
-const BYTES_PER_BYTE: u64 = 64;
-
-/// Memory that a file may still ask for, so that no small file can exhaust the machine.
+/// Memory that a file may still ask for: some however small it is, and more for each byte it
+/// holds. Sharing and compression make honest files grow by less; a few hostile bytes that name
+/// one buffer a million times, or declare an enormous picture, do not exhaust the machine.
 pub(super) struct Budget {
     left_bytes: u64,
+    bytes_per_byte: u64,
 }
 
 impl Budget {
-    /// For a file that holds so many bytes, buffers included.
-    pub(super) fn for_file(held_bytes: u64) -> Budget {
-        Budget { left_bytes: FLOOR_BYTES.saturating_add(held_bytes.saturating_mul(BYTES_PER_BYTE)) }
+    /// For nodes, vertices and keys.
+    pub(super) fn for_geometry() -> Budget {
+        Budget { left_bytes: 1 << 30, bytes_per_byte: 64 }
+    }
+
+    /// For pictures: one of a single colour compresses a thousandfold, so more to begin with.
+    pub(super) fn for_pictures() -> Budget {
+        Budget { left_bytes: 4 << 30, bytes_per_byte: 256 }
+    }
+
+    /// Notes that bytes were read which the memory can be asked for.
+    pub(super) fn grow(&mut self, held_bytes: u64) {
+        let more = held_bytes.saturating_mul(self.bytes_per_byte);
+        self.left_bytes = self.left_bytes.saturating_add(more);
     }
 
     /// Asks for memory before it is allocated. The object names who asks.
@@ -35,7 +42,7 @@ impl Budget {
                 object(),
                 format!("needs {bytes} more bytes of memory, out of proportion to the file's size"),
             )
-            .remedy("share meshes between nodes rather than data between meshes")),
+            .remedy("share meshes between nodes rather than data between meshes; scale pictures")),
         }
     }
 }

@@ -42,6 +42,7 @@ pub(super) fn decode(
     object: &str,
     budget: &mut Budget,
 ) -> Result<Picture, Fault> {
+    budget.grow(bytes.len() as u64);
     const OPENEXR: &[u8] = b"\x76\x2f\x31\x01";
     if bytes.starts_with(OPENEXR) {
         return decode_exr(bytes, object, budget);
@@ -106,9 +107,8 @@ fn decode_exr(bytes: &[u8], object: &str, budget: &mut Budget) -> Result<Picture
     let headers =
         openexr::MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(damaged)?;
     for header in &headers.headers {
-        let channels = header.channels.list.len().max(3) as u64;
         let size = (header.layer_size.width(), header.layer_size.height());
-        reserve(size, 4 * channels, object, budget)?;
+        reserve(size, 12, object, budget)?;
     }
     use openexr::{ReadChannels, ReadLayers};
     let image = openexr::read()
@@ -132,5 +132,9 @@ fn decode_exr(bytes: &[u8], object: &str, budget: &mut Budget) -> Result<Picture
 
 /// Light is neither negative nor infinite.
 fn radiance(value: f32) -> f32 {
-    if value.is_nan() { 0.0 } else { value.clamp(0.0, BRIGHTEST.max(value.min(f32::MAX))) }
+    match value {
+        f32::INFINITY => BRIGHTEST,
+        value if value > 0.0 => value,
+        _ => 0.0,
+    }
 }

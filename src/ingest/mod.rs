@@ -16,6 +16,7 @@
 
 mod budget;
 mod error;
+mod extent;
 mod gltf;
 mod image;
 mod normals;
@@ -40,10 +41,9 @@ pub fn load(path: &Path) -> Result<Scene, IngestError> {
         _ => Err(Fault::new("file", "is in a format that is not read")
             .remedy("convert it to .gltf, .glb or .obj; USD with scripts/usd_to_gltf.py")),
     };
-    match scene {
-        Ok(scene) => {
-            Ok(Scene { source: path.to_path_buf(), files: vec![path.to_path_buf()], ..scene })
-        }
+    let checked = scene.and_then(|scene| extent::check(&scene).map(|()| scene));
+    match checked {
+        Ok(scene) => Ok(Scene { source: path.to_path_buf(), ..scene }),
         Err(fault) => Err(fault.in_file(path)),
     }
 }

@@ -1,12 +1,15 @@
 //! References to other files: only inside the scene's folder, or in the reference itself.
 
 use super::error::Fault;
+use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
 
-/// The folder that a scene may read from: the one its file stands in.
+/// The folder that a scene may read from: the one its file stands in. Remembers what was read.
 pub(super) struct Folder {
     path: PathBuf,
+    files: Mutex<BTreeSet<PathBuf>>,
 }
 
 impl Folder {
@@ -17,9 +20,15 @@ impl Folder {
             _ => Path::new("."),
         };
         match fs::canonicalize(parent) {
-            Ok(path) => Ok(Folder { path }),
+            Ok(path) => Ok(Folder { path, files: Mutex::default() }),
             Err(error) => Err(Fault::new("folder", error).remedy("check the path")),
         }
+    }
+
+    /// The scene's file and all files that were read through this folder.
+    pub(super) fn into_files(self, scene: &Path) -> Vec<PathBuf> {
+        let read = self.files.into_inner().unwrap_or_else(PoisonError::into_inner);
+        std::iter::once(scene.to_path_buf()).chain(read).collect()
     }
 
     /// The bytes of the file that a glTF URI names, or of the `data:` URI itself.
@@ -81,6 +90,7 @@ impl Folder {
     }
 
     pub(super) fn read(&self, file: &Path, object: &str) -> Result<Vec<u8>, Fault> {
+        self.files.lock().unwrap_or_else(PoisonError::into_inner).insert(file.to_path_buf());
         fs::read(file).map_err(|error| {
             let problem = format!("{} cannot be read: {error}", file.display());
             Fault::new(object, problem).remedy("check the file and its permissions")
@@ -131,7 +141,7 @@ fn decode_data_uri(rest: &str) -> Result<Vec<u8>, &'static str> {
 fn decode_base64(text: &[u8]) -> Option<Vec<u8>> {
     let padding = text.iter().rev().take_while(|&&c| c == b'=').count();
     let digits = &text[..text.len() - padding];
-    if padding > 2 || (padding > 0 && text.len() % 4 != 0) || digits.len() % 4 == 1 {
+    if padding > 2 || (padding > 0 && !text.len().is_multiple_of(4)) || digits.len() % 4 == 1 {
         return None;
     }
     let mut bytes = Vec::with_capacity(digits.len() / 4 * 3 + 2);

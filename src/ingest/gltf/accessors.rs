@@ -297,10 +297,10 @@ impl<'a> Strided<'a> {
         }
         let offset = row.byte_offset.unwrap_or(0);
         let alignment = component.size() as u64;
-        let aligned = offset % alignment == 0
-            && (offset.wrapping_add(view_row.byte_offset)) % alignment == 0
-            && stride as u64 % alignment == 0
-            && (shape.columns == 1 || offset % 4 == 0);
+        let aligned = offset.is_multiple_of(alignment)
+            && offset.wrapping_add(view_row.byte_offset).is_multiple_of(alignment)
+            && (stride as u64).is_multiple_of(alignment)
+            && (shape.columns == 1 || offset.is_multiple_of(4));
         if !aligned {
             return Err(fault("is not aligned to its component type".into()));
         }

@@ -104,7 +104,7 @@ fn channel(
                 if !(0.5..2.0).contains(&length) {
                     return Err(Fault::new(object, "has a rotation that is not a unit quaternion"));
                 }
-                *value = *value / length;
+                *value /= length;
             }
             Channel::Rotation(Keys { times_s, values, interpolation })
         }

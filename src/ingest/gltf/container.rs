@@ -77,7 +77,7 @@ impl Container {
                 let room = length - start;
                 return damaged(&object, format!("says {size} bytes, but {room} are left"));
             }
-            if size % 4 != 0 {
+            if !size.is_multiple_of(4) {
                 return damaged(&object, format!("its length {size} is not a multiple of 4"));
             }
             match (kind, number) {

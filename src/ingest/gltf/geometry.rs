@@ -110,7 +110,7 @@ impl Meshes {
         let corners = indices.map_or(positions.count, |indices| indices.count);
         let triangle_bytes = 12 * corners as u64;
         output.budget.take(triangle_bytes, || object.to_string())?;
-        if primitive.mode == 4 && corners % 3 != 0 {
+        if primitive.mode == 4 && !corners.is_multiple_of(3) {
             output.notes.add(object, "its last triangle lacks corners; not drawn");
         }
         let corner = |i: usize| indices.map_or(i as u32, |indices| indices.index(i));

@@ -157,13 +157,14 @@ impl Walk<'_> {
         placed: &Placed,
     ) -> Result<(), Fault> {
         if let Some(radius) = placed.sphere_radius()? {
-            if self.uniform[node as usize] {
-                let material = self.meshes.only_material(self.source, output, mesh)?;
-                let material = material.map(|m| &output.scene.materials[m as usize]);
-                if let Some(sphere) = lights::sphere(material, radius, node, placed) {
-                    output.scene.lights.push(sphere);
-                    return Ok(());
-                }
+            let material = self.meshes.only_material(self.source, output, mesh)?;
+            let material = material.map(|m| &output.scene.materials[m as usize]);
+            if let Some(material) = material.filter(|_| self.uniform[node as usize])
+                && material.emission_texture.is_none()
+            {
+                let sphere = lights::sphere(material, radius, node, placed);
+                output.scene.lights.push(sphere);
+                return Ok(());
             }
             output.notes.add(
                 placed.object,

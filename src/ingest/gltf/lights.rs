@@ -21,7 +21,9 @@ pub(super) struct Placed<'a> {
 impl Placed<'_> {
     /// The radius of the sphere light that the mesh stands for, if it does.
     pub(super) fn sphere_radius(&self) -> Result<Option<f32>, Fault> {
-        let Some(lux) = self.lux.filter(|lux| lux.kind == "SphereLight") else { return Ok(None) };
+        // One node has one light.
+        let is_sphere = |lux: &&UsdLux| lux.kind == "SphereLight" && !self.has_light;
+        let Some(lux) = self.lux.filter(is_sphere) else { return Ok(None) };
         match lux.radius.map(|radius| radius.f32()) {
             Some(radius) if radius <= 0.0 => {
                 Err(Fault::new(self.object, "extras.usdLux: radius is not positive"))
@@ -112,18 +114,11 @@ pub(super) fn shaping(lux: Option<&UsdLux>, object: &str) -> Result<Option<Shapi
     }))
 }
 
-/// The sphere light that a tessellated mesh of this material stands for; `None` if the mesh's
-/// emission is not that of a sphere light.
-pub(super) fn sphere(
-    material: Option<&Material>,
-    radius: f32,
-    node: u32,
-    placed: &Placed,
-) -> Option<Light> {
-    let material = material.filter(|m| m.emits() && m.emission_texture.is_none())?;
+/// The sphere light that a tessellated mesh of this material stands for.
+pub(super) fn sphere(material: &Material, radius: f32, node: u32, placed: &Placed) -> Light {
     let radiance_nits = material.emission_nits;
     let kind = LightKind::Sphere { radiance_nits, radius, shaping: placed.shaping };
-    Some(Light { node, kind, range_m: None, forced: placed.forced })
+    Light { node, kind, range_m: None, forced: placed.forced }
 }
 
 fn dome(
@@ -140,7 +135,7 @@ fn dome(
         Some(uri) => {
             let object = format!("{object}, dome texture {uri:?}");
             let bytes = source.folder.read_uri(uri, &object)?;
-            let picture = image::decode(&bytes, Coding::Srgb, &object, &mut output.budget)?;
+            let picture = image::decode(&bytes, Coding::Srgb, &object, &mut output.picture_budget)?;
             output.scene.textures.push(Texture {
                 name: uri.clone(),
                 width: picture.width,

@@ -38,6 +38,7 @@ struct Output {
     scene: Scene,
     notes: Notes,
     budget: Budget,
+    picture_budget: Budget,
 }
 
 /// Reads a file. Only a file called `.glb` must be binary: a `.gltf` may be either.
@@ -51,13 +52,19 @@ pub(super) fn load(path: &Path, must_be_glb: bool) -> Result<Scene, Fault> {
     validate::contents(&document, &accessors)?;
     let source =
         Source { document: &document, accessors: &accessors, buffers: &buffers, folder: &folder };
-    let budget = Budget::for_file(buffers.size().saturating_add(file.size() as u64));
-    let mut output = Output { scene: Scene::default(), notes: Notes::default(), budget };
+    let mut output = Output {
+        scene: Scene::default(),
+        notes: Notes::default(),
+        budget: Budget::for_geometry(),
+        picture_budget: Budget::for_pictures(),
+    };
+    output.budget.grow(buffers.size().saturating_add(file.size() as u64));
     output.scene.timeline = timeline(&document)?;
     note_unread_extensions(&document, &mut output.notes);
     textures::check_references(&source)?;
     hierarchy::compile(&source, &mut output)?;
     output.scene.notes = output.notes.into_lines();
+    output.scene.files = folder.into_files(path);
     Ok(output.scene)
 }
 

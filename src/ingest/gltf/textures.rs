@@ -7,15 +7,16 @@ use crate::ingest::image::{self, Coding};
 use crate::scene::{Texture, TextureUse, Wrap};
 use glam::{Affine2, Mat2, Vec2};
 use std::borrow::Cow;
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
 
-/// What tells textures apart: two with the same key are one.
-type Key = (u32, [Wrap; 2], bool, Coding);
+/// How a texture's image is sampled: wrapping, bilinear or not, and what its values mean.
+type Rule = ([Wrap; 2], bool, Coding);
 
 /// The textures that were compiled.
 #[derive(Default)]
 pub(super) struct Textures {
-    compiled: Vec<(Key, u32)>,
+    /// By image; few rules exist.
+    compiled: HashMap<u32, Vec<(Rule, u32)>>,
     /// Images that cannot be read and were noted.
     unread: HashSet<u32>,
 }
@@ -52,7 +53,7 @@ impl Textures {
         let wrap = [sampler.and_then(|s| s.wrap_s), sampler.and_then(|s| s.wrap_t)].map(wrap);
         const NEAREST: u32 = 9728;
         let bilinear = sampler.and_then(|s| s.mag_filter) != Some(NEAREST);
-        let Some(texture) = self.texture(source, output, (image, wrap, bilinear, coding))? else {
+        let Some(texture) = self.texture(source, output, image, (wrap, bilinear, coding))? else {
             return Ok(None);
         };
         let transform = info.extensions.transform.as_ref();
@@ -74,10 +75,11 @@ impl Textures {
         &mut self,
         source: &Source,
         output: &mut Output,
-        key: Key,
+        image: u32,
+        rule: Rule,
     ) -> Result<Option<u32>, Fault> {
-        let (image, wrap, bilinear, coding) = key;
-        if let Some((_, texture)) = self.compiled.iter().find(|(known, _)| *known == key) {
+        let known = self.compiled.get(&image).into_iter().flatten();
+        if let Some((_, texture)) = known.into_iter().find(|(known, _)| *known == rule) {
             return Ok(Some(*texture));
         }
         if self.unread.contains(&image) {
@@ -91,13 +93,14 @@ impl Textures {
             self.unread.insert(image);
             return Ok(None);
         }
-        let picture = image::decode(&bytes, coding, &object, &mut output.budget)?;
+        let (wrap, bilinear, coding) = rule;
+        let picture = image::decode(&bytes, coding, &object, &mut output.picture_budget)?;
         let uri = row.uri.as_deref().filter(|uri| !uri.starts_with("data:"));
         let name = row.name.as_deref().or(uri).unwrap_or(&object).to_string();
         let (width, height, pixels) = (picture.width, picture.height, picture.pixels);
         output.scene.textures.push(Texture { name, width, height, pixels, wrap, bilinear });
         let texture = output.scene.textures.len() as u32 - 1;
-        self.compiled.push((key, texture));
+        self.compiled.entry(image).or_default().push((rule, texture));
         Ok(Some(texture))
     }
 }

@@ -7,13 +7,14 @@ use crate::ingest::notes::Notes;
 use crate::ingest::uri::Folder;
 use crate::math::color::Rgb;
 use crate::scene::{AlphaMode, Material, Scene, Texture, TextureUse, Wrap};
+use std::collections::HashMap;
 
 /// Compiles materials, and the textures that they use.
 pub(super) struct Materials<'a> {
     pub folder: &'a Folder,
     pub budget: Budget,
     /// Textures that were asked for, by file and coding; `None` for those that cannot be read.
-    pub textures: Vec<((String, Coding), Option<u32>)>,
+    pub textures: HashMap<(String, Coding), Option<u32>>,
 }
 
 impl Materials<'_> {
@@ -84,8 +85,8 @@ impl Materials<'_> {
             file = file.rsplit(char::is_whitespace).next().unwrap_or(file);
         }
         let usage = |texture: u32| TextureUse { texture, uv_set: 0, transform: None };
-        let known = self.textures.iter().find(|((name, code), _)| name == file && *code == coding);
-        if let Some((_, texture)) = known {
+        let key = (file.to_string(), coding);
+        if let Some(texture) = self.textures.get(&key) {
             return Ok(texture.map(usage));
         }
         let name = format!("{object}, texture {file:?}");
@@ -113,7 +114,7 @@ impl Materials<'_> {
                 Some(scene.textures.len() as u32 - 1)
             }
         };
-        self.textures.push(((file.to_string(), coding), texture));
+        self.textures.insert(key, texture);
         Ok(texture.map(usage))
     }
 }

@@ -6,6 +6,7 @@
 //! textures are noted rather than refused.
 
 mod materials;
+mod text;
 
 use super::budget::Budget;
 use super::error::Fault;
@@ -16,22 +17,22 @@ use super::uri::Folder;
 use crate::scene::{Instance, Mesh, Node, Scene, Trs};
 use glam::{Vec2, Vec3, Vec4};
 use materials::Materials;
-use std::borrow::Cow;
 use std::cell::RefCell;
 use std::collections::HashMap;
 use std::path::Path;
-
-/// How far into a file a zero byte tells that it is no text.
-const LOOKED_AT_BYTES: usize = 4096;
 
 /// Reads a file.
 pub(super) fn load(path: &Path) -> Result<Scene, Fault> {
     let bytes = super::read_file(path)?;
     let folder = Folder::of(path)?;
-    let text = text(&bytes).map_err(|problem| {
+    let mut text = text::decode(&bytes).map_err(|problem| {
         Fault::new("file", problem).remedy("save it as UTF-8 text, or fetch or export it again")
     })?;
     let notes = RefCell::new(Notes::default());
+    if text::check(&text)?.polylines {
+        notes.borrow_mut().add("file", "lines are not drawn");
+        text = text::without_polylines(&text).into();
+    }
     // One vertex per combination of position, normal and texture coordinate; fans.
     let options = tobj::GPU_LOAD_OPTIONS;
     let library = |file: &Path| Ok(read_library(&folder, file, &mut notes.borrow_mut()));
@@ -42,11 +43,8 @@ pub(super) fn load(path: &Path) -> Result<Scene, Fault> {
 
     let mut scene = Scene::default();
     let mut paths = PrimPaths::default();
-    let mut materials = Materials {
-        folder: &folder,
-        budget: Budget::for_file(bytes.len() as u64),
-        textures: vec![],
-    };
+    let mut materials =
+        Materials { folder: &folder, budget: Budget::for_pictures(), textures: HashMap::new() };
     let mut compiled: Vec<Option<u32>> = vec![None; rows.len()];
     for (i, model) in models.into_iter().enumerate() {
         let object = format!("object {i} {:?}", model.name);
@@ -75,18 +73,8 @@ pub(super) fn load(path: &Path) -> Result<Scene, Fault> {
         return Err(Fault::new("file", "holds no faces").remedy("export the faces of the model"));
     }
     scene.notes = notes.into_lines();
+    scene.files = folder.into_files(path);
     Ok(scene)
-}
-
-/// The text of a file; what is not UTF-8 in it (names and comments, in practice) is replaced.
-fn text(bytes: &[u8]) -> Result<Cow<'_, str>, &'static str> {
-    if bytes.starts_with(b"\xFF\xFE") || bytes.starts_with(b"\xFE\xFF") {
-        return Err("is UTF-16");
-    }
-    if bytes[..bytes.len().min(LOOKED_AT_BYTES)].contains(&0) {
-        return Err("is not text");
-    }
-    Ok(String::from_utf8_lossy(bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes)))
 }
 
 type Library = (Vec<tobj::Material>, HashMap<String, usize>);
@@ -98,7 +86,7 @@ fn read_library(folder: &Folder, file: &Path, notes: &mut Notes) -> Library {
         let name = file.to_str().ok_or("its name is not UTF-8")?;
         let file = folder.resolve(name, &object).map_err(Fault::into_problem)?;
         let bytes = folder.read(&file, &object).map_err(Fault::into_problem)?;
-        tobj::load_mtl_buf(&mut text(&bytes)?.as_bytes()).map_err(|error| error.to_string())
+        tobj::load_mtl_buf(&mut text::decode(&bytes)?.as_bytes()).map_err(|error| error.to_string())
     };
     read().unwrap_or_else(|problem| {
         notes.add(&*object, format!("{problem}; surfaces are drawn with the default material"));

@@ -305,7 +305,8 @@ impl Document {
             let problem = format!("{} bytes of JSON are more than can be read", json.len());
             return Err(Fault::new("JSON", problem).remedy("keep binary data in buffers"));
         }
-        if json.starts_with(b"\xEF\xBB\xBF") || json.starts_with(b"\xFF\xFE") {
+        let marks: [&[u8]; 3] = [b"\xEF\xBB\xBF", b"\xFF\xFE", b"\xFE\xFF"];
+        if marks.iter().any(|mark| json.starts_with(mark)) {
             return Err(Fault::new("JSON", "starts with a byte order mark")
                 .remedy("save the file as UTF-8 without one"));
         }

@@ -1,10 +1,6 @@
 //! Files that others collected because they broke something, and files broken here.
 
-#[path = "ingest/files.rs"]
-mod files;
-#[path = "ingest/shared.rs"]
-mod shared;
-
+use crate::{files, shared};
 use candelabra::ingest::load;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
@@ -78,10 +74,10 @@ fn gltf_verdicts_agree_with_the_khronos_validator() {
                     disagreements.push(format!("{name} loads, but has {codes:?}"));
                 }
             }
-            Err(error) if codes.is_empty() => {
-                if !STRICTER.iter().any(|(part, _)| name.ends_with(part)) {
-                    disagreements.push(format!("{name} should load: {error}"));
-                }
+            Err(error)
+                if codes.is_empty() && !STRICTER.iter().any(|(part, _)| name.ends_with(part)) =>
+            {
+                disagreements.push(format!("{name} should load: {error}"));
             }
             _ => {}
         }
@@ -227,7 +223,8 @@ fn rich() -> files::File {
 #[test]
 fn no_damage_to_a_file_is_fatal() {
     const VARIANTS: usize = 4000;
-    let folder = tempfile::tempdir().unwrap();
+    // Thousands of files: in memory, where there is such a folder.
+    let folder = tempfile::tempdir_in("/dev/shm").or_else(|_| tempfile::tempdir()).unwrap();
     let rich = rich();
     rich.load().expect("the undamaged file is good");
     std::fs::write(folder.path().join("data.bin"), &rich.data).unwrap();

@@ -1,0 +1,10 @@
+//! Files in, a scene index out.
+
+mod files;
+mod gltf;
+mod malformed;
+mod obj;
+mod real;
+mod refused;
+mod shared;
+mod usd;

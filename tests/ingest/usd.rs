@@ -1,0 +1,177 @@
+//! What `extras` carry from USD: `src/ingest/carriers.md`, row by row.
+
+use crate::files;
+use crate::files::{File, lamp};
+use candelabra::scene::{LightKind, Pixels, Scene, Shaping, Timeline};
+use glam::Vec3;
+use serde_json::json;
+use std::f32::consts::{FRAC_PI_3, FRAC_PI_6};
+
+fn load(edit: impl FnOnce(&mut File)) -> Scene {
+    let mut file = lamp();
+    edit(&mut file);
+    file.load().unwrap_or_else(|error| panic!("{error}"))
+}
+
+#[test]
+fn a_sphere_replaces_the_mesh_that_stands_for_it() {
+    let scene = load(|file| {
+        file.lux(json!({"type": "SphereLight", "radius": 0.5, "force": true}));
+        file.json["nodes"][0]["scale"] = json!([2, -2, 2]);
+    });
+    assert!(scene.instances.is_empty() && scene.meshes.is_empty());
+    let expected =
+        LightKind::Sphere { radiance_nits: Vec3::new(8.0, 4.0, 2.0), radius: 0.5, shaping: None };
+    assert_eq!((&scene.lights[0].kind, scene.lights[0].forced), (&expected, true));
+    assert_eq!(scene.light_path(0), "/lamp");
+}
+
+#[test]
+fn a_stretched_sphere_stays_a_mesh() {
+    let stretched = |file: &mut File| {
+        file.lux(json!({"type": "SphereLight", "radius": 0.5, "force": true}));
+        file.json["nodes"][0]["scale"] = json!([1, 2, 1]);
+    };
+    let below_stretched = |file: &mut File| {
+        file.lux(json!({"type": "SphereLight", "radius": 0.5, "force": true}));
+        let matrix = json!([1, 0, 0, 0, 0.5, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]);
+        file.add("nodes", json!({"matrix": matrix, "children": [0]}));
+        file.json["scenes"][0]["nodes"] = json!([1]);
+    };
+    let animated = |file: &mut File| {
+        file.lux(json!({"type": "SphereLight", "radius": 0.5, "force": true}));
+        let times = file.times(&[0.0, 1.0]);
+        let scales = file.floats(&[1.0, 1.0, 1.0, 1.0, 2.0, 1.0], "VEC3");
+        file.add(
+            "animations",
+            json!({
+                "samplers": [{"input": times, "output": scales}],
+                "channels": [{"sampler": 0, "target": {"node": 0, "path": "scale"}}],
+            }),
+        );
+    };
+    for scene in [load(stretched), load(below_stretched), load(animated)] {
+        assert!(scene.lights.is_empty());
+        assert!(scene.instances[0].forced);
+        assert!(scene.notes[0].contains("sphere is stretched"), "{:?}", scene.notes);
+    }
+}
+
+#[test]
+fn shaping_is_usds() {
+    let shaping = json!({"coneAngle": 60, "coneSoftness": 0.5, "focus": 2, "focusTint": [1, 0, 0]});
+    let expected = Shaping::Usd {
+        cone_rad: FRAC_PI_3,
+        softness: 0.5,
+        focus: 2.0,
+        focus_tint: [1.0, 0.0, 0.0],
+    };
+    let mesh = load(|file| file.lux(json!({"type": "RectLight", "shaping": shaping})));
+    assert_eq!(mesh.instances[0].shaping, Some(expected));
+    let spot = load(|file| {
+        file.light(json!({"type": "spot", "intensity": 5, "spot": {}}));
+        file.lux(json!({"type": "SphereLight", "shaping": shaping}));
+        file.json["nodes"][0].as_object_mut().unwrap().remove("mesh");
+    });
+    let intensity_cd = Vec3::splat(5.0);
+    assert_eq!(spot.lights[0].kind, LightKind::Spot { intensity_cd, shaping: expected });
+    let sphere = load(|file| {
+        file.lux(json!({"type": "SphereLight", "radius": 1, "shaping": {}}));
+    });
+    let LightKind::Sphere { shaping: Some(Shaping::Usd { cone_rad, softness, .. }), .. } =
+        sphere.lights[0].kind
+    else {
+        panic!("{:?}", sphere.lights);
+    };
+    assert_eq!((cone_rad, softness), (std::f32::consts::FRAC_PI_2, 0.0), "UsdLux's defaults");
+}
+
+#[test]
+fn a_sun_has_an_angle() {
+    let scene = load(|file| {
+        file.light(json!({"type": "directional", "intensity": 100}));
+        file.lux(json!({"type": "DistantLight", "angle": 30}));
+    });
+    let sun = LightKind::Distant { irradiance_lux: Vec3::splat(100.0), angle_rad: FRAC_PI_6 };
+    assert_eq!(scene.lights[0].kind, sun);
+}
+
+#[test]
+fn a_dome_has_a_picture() {
+    let folder = tempfile::tempdir().unwrap();
+    let sky = |x: usize, y: usize| match (x, y) {
+        (1, 0) => (f32::INFINITY, -1.0, f32::NAN),
+        _ => (x as f32, y as f32, 70000.0),
+    };
+    exr::prelude::write_rgb_file(folder.path().join("sky.exr"), 4, 2, sky).unwrap();
+    std::fs::write(folder.path().join("sky.png"), files::png(4, 2, [255; 4])).unwrap();
+    let dome = |texture: &str| {
+        let mut file = lamp();
+        file.add(
+            "nodes",
+            json!({"name": "sky", "extras": {"usdLux": {
+                "type": "DomeLight", "radiance": [1, 2, 3], "texture": texture,
+            }}}),
+        );
+        file.json["scenes"][0]["nodes"] = json!([0, 1]);
+        file.load_in(folder.path()).unwrap()
+    };
+    let scene = dome("sky.exr");
+    let expected = LightKind::Dome { radiance_nits: Vec3::new(1.0, 2.0, 3.0), texture: Some(0) };
+    assert_eq!(scene.lights[0].kind, expected);
+    let Pixels::Float(pixels) = &scene.textures[0].pixels else { panic!() };
+    assert_eq!((scene.textures[0].width, scene.textures[0].height), (4, 2));
+    assert_eq!(pixels[4 + 2], [2.0, 1.0, 70000.0]);
+    assert_eq!(pixels[1], [65504.0, 0.0, 0.0], "light is neither negative nor infinite");
+    assert!(matches!(dome("sky.png").textures[0].pixels, Pixels::Srgb8(_)));
+}
+
+#[test]
+fn a_camera_has_a_lens() {
+    let camera = |usd: serde_json::Value| {
+        let scene = load(|file| {
+            let lens = json!({"yfov": 0.5, "aspectRatio": 1.5});
+            file.add("cameras", json!({"type": "perspective", "perspective": lens}));
+            file.add("cameras", json!({"type": "orthographic"}));
+            file.json["nodes"][0]["camera"] = json!(0);
+            file.json["nodes"][0]["extras"] = json!({"usdCamera": usd});
+            file.add("nodes", json!({"camera": 1}));
+            file.json["scenes"][0]["nodes"] = json!([0, 1]);
+        });
+        assert_eq!(scene.notes.len(), 1, "orthographic: {:?}", scene.notes);
+        scene.cameras[0].clone()
+    };
+    let lens = camera(json!({
+        "fStop": 2, "focalLength_m": 0.05, "focusDistance_m": 3, "filmOffset": [0.1, -0.2],
+    }));
+    assert_eq!((lens.yfov_rad, lens.aspect), (0.5, Some(1.5)));
+    assert_eq!((lens.lens_radius_m, lens.focus_distance_m), (0.0125, 3.0));
+    assert_eq!(lens.film_offset, [0.1, -0.2]);
+    let pinhole = camera(json!({"fStop": 0, "focalLength_m": 0.05, "focusDistance_m": 3}));
+    assert_eq!(pinhole.lens_radius_m, 0.0);
+}
+
+#[test]
+fn the_clock_is_the_stages() {
+    assert_eq!(load(|_| ()).timeline, Timeline::default());
+    let scene = load(|file| {
+        file.json["asset"]["extras"] = json!({"usd": {
+            "timeCodesPerSecond": 25, "startTimeCode": 1001, "endTimeCode": 1048,
+        }});
+    });
+    let expected =
+        Timeline { first_frame: 1001.0, frames_per_second: 25.0, last_frame: Some(1048.0) };
+    assert_eq!(scene.timeline, expected);
+}
+
+#[test]
+fn what_is_not_carried_is_noted() {
+    let scene = load(|file| {
+        let values = json!({"times": [0, 1], "rgb": [[1, 1, 1], [2, 2, 2]]});
+        file.lux(json!({"type": "RectLight", "values": values}));
+        file.add("nodes", json!({"extras": {"usdLux": {"type": "PortalLight"}}}));
+        file.json["scenes"][0]["nodes"] = json!([0, 1]);
+    });
+    assert_eq!(scene.notes.len(), 2, "{:?}", scene.notes);
+    assert!(scene.notes.iter().any(|note| note.contains("node 1") && note.contains("PortalLight")));
+}
