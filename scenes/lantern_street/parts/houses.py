@@ -157,7 +157,7 @@ def shop(layer, mesh, dice, x0, x1, name, style):
         x = x0 + (x1 - x0) * (k + 0.5) / count
         tube(mesh, [(x, 0, 385), (x, -42, 392), (x, -50, 384)], 1.3, 4, "Iron")
         light(layer, "SphereLight", f"{name}_Spot{k}", (x, -52, 381), (48, 0, 0), 3000, (52, 0.6), radius=3,
-              intensity=2200, treatAsPoint=True)
+              intensity=1500, treatAsPoint=True)
     if style["awning"]:
         stripes = round((x1 - x0 + 20) / 26)
         cloth = Mesh()
@@ -179,7 +179,7 @@ def arcade(layer, mesh, dice, width, bays, material):
         box(mesh, (k * bay - 24 if k else 0, -5, 0), (k * bay + 24, 0, 24), "Stone", "y+")
         box(mesh, (k * bay - 24 if k else 0, -4, 200), (k * bay + 24, 0, 210), "Stone", "y+")
         light(layer, "CylinderLight", f"Tube{k}", ((k + 0.5) * bay, 150, 322), (0, 0, 0), 3400 if k % 2 else 2700,
-              length=bay * 0.5, radius=2.2, intensity=55)
+              length=bay * 0.5, radius=2.2, intensity=38)
     room(mesh, (0, 42, 0), (width, 260, 335), "Interior", "y-", floor="Flags")
     for k in range(bays):
         x = (k + 0.5) * bay
@@ -231,10 +231,10 @@ LIT = ["CurtainAmber", "CurtainCream", "RoomWarm", "CurtainRose", "RoomStudy", "
 def house(layer, name, at, turn, seed, bays, floors, ground, plaster, style):
     """Returns its width. `style` has the shop's paint, board, awning, kelvin and nits."""
     dice = Dice(seed)
-    bay = dice(168, 186)
+    bay = round(dice(168, 186))
     width, height = bays * bay, GROUND + floors * 300 + 30
     with layer.prim("Xform", name, body=place(at(width), turn)):
-        mesh = Mesh(uv_size=420 if plaster != "Brick" else 190)
+        mesh = Mesh(uv_size=420 if plaster != "Brick" else 190, digits=1)
         openings, panes = [], []
         for floor in range(floors):
             for k in range(bays):
@@ -268,7 +268,9 @@ def house(layer, name, at, turn, seed, bays, floors, ground, plaster, style):
         stacks = [60 + dice() * 60, width - 60 - dice() * 90][:1 + (bays > 3)]
         roof(mesh, width, height, 700, dice(200, 330), "Slate" if seed % 3 else "Tile", stacks, plaster)
         box(mesh, (width - 7, -9, 12), (width + 2, -1, height - 20), "Iron", "z-z+")   # downpipe
-        mesh.write(layer, "Body")
+        walls, trim = mesh.split(lambda m: m.startswith("Plaster") or m == "Brick")
+        walls.write(layer, "Walls")
+        trim.write(layer, "Trim")
         for k, floor, x, z in panes:
             lit = dice() < 0.66
             kind = dice.pick(LIT) if lit else dice.pick(["Dark", "Shuttered", "Dark"])
@@ -285,10 +287,10 @@ def pane(layer, kind, name, at):
 
 
 SHOPS = [
-    dict(paint="GreenPaint", board="GreenPaint", awning="ClothGreen", front="DarkStone", kelvin=2800, nits=26),
-    dict(paint="RedPaint", board="Board", awning="ClothRed", front="Stone", kelvin=3000, nits=30),
-    dict(paint="BluePaint", board="BluePaint", awning=None, front="DarkStone", kelvin=4200, nits=22),
-    dict(paint="Timber", board="Timber", awning="ClothRed", front="Brick", kelvin=2500, nits=28),
+    dict(paint="GreenPaint", board="GreenPaint", awning="ClothGreen", front="DarkStone", kelvin=3000, nits=15),
+    dict(paint="RedPaint", board="Board", awning="ClothRed", front="Stone", kelvin=3300, nits=17),
+    dict(paint="BluePaint", board="BluePaint", awning=None, front="DarkStone", kelvin=4600, nits=14),
+    dict(paint="Timber", board="Timber", awning="ClothRed", front="Brick", kelvin=2700, nits=16),
 ]
 # bays, floors, ground floor, front; from the camera to the end of the street
 LEFT = [(3, 3, "plain", "PlasterIvory"), (3, 3, "shop", "PlasterRose"), (4, 2, "arcade", "PlasterOchre"),

@@ -18,7 +18,7 @@ def glass(layer, name, strokes, radius, step, color, nits, y=-9, closed=False, s
 
 PINK, GOLD, WHITE, FLAME = (1, 0.045, 0.13), (1, 0.42, 0.06), (0.8, 0.9, 1.0), (1, 0.22, 0.02)
 CYAN, GREEN, BLUE = (0.03, 0.70, 1.0), (0.10, 1.0, 0.25), (0.08, 0.22, 1.0)
-WIDE, TALL = 132, 520
+WIDE, TALL = 136, 540
 
 
 def blade(folder):
@@ -26,17 +26,17 @@ def blade(folder):
     layer = Layer("assets/neon_candelabra.usda", "The neon of the house sign, one face. Written by make.py.")
     with layer.root("NeonCandelabra"):
         stand, candles, flames = candelabra(0, TALL - 140, 124)
-        count = glass(layer, "Stand", stand, 1.5, 3.0, GOLD, 11)
-        count += glass(layer, "Candles", candles, 1.2, 3.0, WHITE, 6)
-        count += glass(layer, "Flames", flames, 1.3, 1.6, FLAME, 16, closed=True)
-        strokes, pitch, size = [], 36.0, 28.5
+        count = glass(layer, "Stand", stand, 1.6, 4.0, GOLD, 8)
+        count += glass(layer, "Candles", candles, 1.3, 5.0, WHITE, 6)
+        count += glass(layer, "Flames", flames, 1.3, 2.4, FLAME, 9, closed=True)
+        strokes, pitch, size = [], 37.0, 29.5
         for k, name in enumerate("CANDELABRA"):
-            strokes += letter(name, -size / 3 * 1.3, TALL - 186 - k * pitch, size)
-        count += glass(layer, "Letters", [[(1.3 * x, z) for x, z in s] for s in strokes], 1.9, 2.2, PINK, 13, sides=8)
+            strokes += letter(name, -size / 3, TALL - 190 - k * pitch, size)
+        count += glass(layer, "Letters", [[(2.3 * x, z) for x, z in s] for s in strokes], 2.2, 3.4, PINK, 11)
         w, r = WIDE / 2 - 5, 14
         frame = [(-w + r, 5), (w - r, 5), (w, 5 + r), (w, TALL - 5 - r), (w - r, TALL - 5), (-w + r, TALL - 5),
                  (-w, TALL - 5 - r), (-w, 5 + r)]
-        count += glass(layer, "Frame", [frame], 1.3, 5.0, CYAN, 7, closed=True)
+        count += glass(layer, "Frame", [frame], 1.4, 8.0, CYAN, 6, closed=True)
     layer.save(folder)
     return count
 
@@ -55,7 +55,7 @@ def small(layer, name, text, height, color, nits, at, turn, upright=False, frame
         mesh = Mesh()
         box(mesh, (x0, -4, z0), (x1, 4, z1), "Board")
         mesh.write(layer, "Board")
-        count = glass(layer, "Letters", strokes, 1.7, 4.0, color, nits)
+        count = glass(layer, "Letters", strokes, 1.8, 5.0, color, nits)
         if frame:
             edge = [(x0 + 3, z0 + 3), (x1 - 3, z0 + 3), (x1 - 3, z1 - 3), (x0 + 3, z1 - 3)]
             count += glass(layer, "Frame", [edge], 1.2, 8.0, frame, nits * 0.7, closed=True)
@@ -66,7 +66,7 @@ def write(folder):
     count = 2 * blade(folder)
     layer = Layer("layers/signs.usda", "Neon and lit signs. Written by make.py.")
     with layer.root("Signs", "group"):
-        with layer.prim("Xform", "HouseSign", body=place((438, 1130, 235))):
+        with layer.prim("Xform", "HouseSign", body=place((432, 1480, 318))):
             mesh = Mesh()
             box(mesh, (-WIDE / 2, -6, 0), (WIDE / 2, 6, TALL), "Board")
             for z in (60, TALL - 60):
@@ -91,7 +91,7 @@ def write(folder):
             box(mesh, (-156, -8, -6), (156, 4, 137), "Iron")
             mesh.write(layer, "Back")
         # The tea house: the same idea as a textured rect light.
-        with layer.prim("Xform", "TeaSign", body=place((452, 520, 262), 0)):
+        with layer.prim("Xform", "TeaSign", body=place((452, 520, 312), 0)):
             mesh = Mesh()
             box(mesh, (-40, -5, -3), (40, 5, 137), "Board")
             box(mesh, (40, -2, 108), (70, 2, 114), "Iron", "x-x+")

@@ -20,17 +20,17 @@ def depth(x, y):
 
 
 def roadway(layer):
-    xs = [-KERB + 2 * KERB * i / 34 for i in range(35)]
+    xs = [-KERB + 2 * KERB * i / 46 for i in range(47)]
     ys, y = [START], START
-    while y < END:
-        y += 26 if y < 1400 else 26 + (y - 1400) * 0.03
+    while y < END:                                         # finest where the camera looks: its picture begins at y = 300
+        y += 120 if y < 200 else 14 + max(0, y - 800) * 0.035
         ys.append(min(y, END))
-    mesh, normals, uvs = Mesh(), [], []
+    mesh, normals, uvs = Mesh(digits=2), [], []
     for y in ys:
         for x in xs:
             mesh.vertex((x, y, depth(x, y)))
             slope = [(depth(x + dx, y + dy) - depth(x - dx, y - dy)) / 16 for dx, dy in ((8, 0), (0, 8))]
-            normals.append((-slope[0], -slope[1], 1))
+            normals.append((round(-slope[0], 2), round(-slope[1], 2), 1))
             uvs.append((x / 190, y / 190))
     n = len(xs)
     for j in range(len(ys) - 1):
@@ -102,8 +102,8 @@ def lamp(folder):
             tube(mesh, [(15 * math.cos(t), 15 * math.sin(t), 352), (20 * math.cos(t), 20 * math.sin(t), 393)], 0.9, 4, "Iron")
         tube(mesh, [(-38, 0, 300), (38, 0, 300)], 1.4, 5, "Iron")
         mesh.write(layer, "Post")
-        light(layer, "SphereLight", "Mantle", (0, 0, 372), None, 2500, radius=11, intensity=22)
-        light(layer, "DiskLight", "Reflector", (0, 0, 389), None, 2700, (74, 0.35), radius=19, intensity=3.1, exposure=7)
+        light(layer, "SphereLight", "Mantle", (0, 0, 372), None, 2700, radius=11, intensity=16)
+        light(layer, "DiskLight", "Reflector", (0, 0, 389), None, 3000, (74, 0.35), radius=19, intensity=2, exposure=7)
     layer.save(folder)
 
 

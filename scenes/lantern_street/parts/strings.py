@@ -14,20 +14,20 @@ def lanterns(folder):
         turned(mesh, [(radius, top - 2), (radius, top + 2), (0, top + 3)], 8, "Board")
         turned(mesh, [(0, bottom - 3), (radius, bottom - 2), (radius, bottom + 2)], 8, "Board")
         turned(mesh, [(0.4, bottom - 26), (2.2, bottom - 22), (0.8, bottom - 3)], 5, "ClothRed")
-    for name, color, nits, radius in (("RedBall", (1, 0.075, 0.02), 5, 17), ("AmberBall", (1, 0.42, 0.09), 4.2, 15),
-                                      ("PearlBall", (1, 0.74, 0.42), 3, 18)):
+    for name, color, nits, radius in (("RedBall", (1, 0.045, 0.012), 3.6, 17), ("AmberBall", (1, 0.30, 0.05), 2.8, 15),
+                                      ("PearlBall", (1, 0.66, 0.33), 1.7, 18)):
         with layer.root(name):
             mesh = Mesh()
             fittings(mesh, -18, -18 - 2 * radius, radius * 0.5)
             mesh.write(layer, "Fittings")
             light(layer, "SphereLight", "Paper", (0, 0, -18 - radius), None, color=color, radius=radius, intensity=nits)
-    for name, color, nits, squash in (("RedPaper", (1, 0.10, 0.025), 7.5, 0.82), ("GoldPaper", (1, 0.48, 0.12), 5, 1.15)):
+    for name, color, nits, squash in (("RedPaper", (1, 0.055, 0.015), 5.5, 0.82), ("GoldPaper", (1, 0.36, 0.08), 3.0, 1.15)):
         with layer.root(name):
             r = 21
             mesh = Mesh()
             fittings(mesh, -18, -18 - 2 * r * squash, r * 0.42)
             mesh.write(layer, "Fittings")
-            mesh, sides, rows = Mesh(), 16, 8
+            mesh, sides, rows = Mesh(), 14, 7
             profile = [(r * math.sin(t), -r * squash * math.cos(t)) for t in
                        (math.radians(24 + (156 - 24) * i / rows) for i in range(rows + 1))]
             for j, ((r0, z0), (r1, z1)) in enumerate(zip(profile, profile[1:])):
@@ -42,8 +42,8 @@ def lanterns(folder):
         mesh = Mesh()
         fittings(mesh, -18, -76, 10)
         mesh.write(layer, "Fittings")
-        light(layer, "CylinderLight", "Paper", (0, 0, -47), (0, 90, 0), color=(1, 0.30, 0.10), length=56, radius=12,
-              intensity=4.5)
+        light(layer, "CylinderLight", "Paper", (0, 0, -47), (0, 90, 0), color=(1, 0.20, 0.05), length=56, radius=12,
+              intensity=2.6)
     layer.save(folder)
 
 
@@ -75,6 +75,8 @@ def lantern_rows(layer):
         tube(cables, path, 0.7, 3, "Iron", caps=False)
         beads = resample(path, 104 if y < 3000 else 150)[1:-1]
         for k, (x, yy, z) in enumerate(beads):
+            if x > 300 and 550 < y < 1500:                 # leave the view of the house sign free
+                continue
             items.append((ROWS[row % len(ROWS)][k % 5], (x, yy, z - dice(0, 14))))
             turns.append(dice(0, 6.28))
         row += 1
@@ -100,7 +102,7 @@ def bulbs(folder):
         mesh = Mesh()
         turned(mesh, [(1.2, -4), (1.2, 0.5)], 4, "Rubber")
         mesh.write(layer, "Socket")
-        light(layer, "SphereLight", "Filament", (0, 0, -12.5), None, 2400, radius=2, intensity=260, treatAsPoint=True)
+        light(layer, "SphereLight", "Filament", (0, 0, -12.5), None, 2400, radius=2, intensity=120, treatAsPoint=True)
     layer.save(folder)
 
 
@@ -115,7 +117,7 @@ def festoons(layer):
         while y < 6300:
             span = 330 if y < 3600 else 500
             z = 470 + 20 * side
-            string((side * 505, y, z), (side * 505, y + span, z), 38, 30 if y < 3600 else 60)
+            string((side * 455, y, z), (side * 455, y + span, z), 38, 30 if y < 3600 else 60)
             y += span
     y, side = 600.0, 1
     while y < 6000:                                        # zigzag above the lanterns

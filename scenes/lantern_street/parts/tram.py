@@ -81,7 +81,7 @@ def write(folder):
         for name, x in (("Left", -58), ("Right", 58)):
             light(layer, "DiskLight", f"Lens_{name}", (x, front - 9.6, 96), (90, 0, 180), 4200, radius=11.5, intensity=26)
             light(layer, "SphereLight", f"Headlight_{name}", (x, front - 12, 96), (83, 0, 180), 4200, (24, 0.75), radius=4,
-                  intensity=52000, treatAsPoint=True)
+                  intensity=11000, treatAsPoint=True)
         sign = Mesh()
         sign.face([(-56, front - 2.4, 233), (56, front - 2.4, 233), (56, front - 2.4, 261), (-56, front - 2.4, 261)], "TramSignGlow",
                   uv=[(0, 0), (1, 0), (1, 1), (0, 1)])

@@ -94,14 +94,14 @@ class _Root(_Prim):
 
 
 class Mesh:
-    """Polygons with a material each. Vertices that agree to a hundredth of a millimetre are shared."""
+    """Polygons with a material each. Vertices are rounded to `digits` (of a centimetre); equal ones are shared."""
 
-    def __init__(self, uv_size=None):
+    def __init__(self, uv_size=None, digits=2):
         self.points, self.index, self.faces, self.uvs = [], {}, [], []
-        self.uv_size, self.at = uv_size, lambda p: p
+        self.uv_size, self.digits = uv_size, digits
 
     def vertex(self, p):
-        key = tuple(round(float(c), 3) for c in self.at(p))
+        key = tuple(round(float(c), self.digits) for c in p)
         if key not in self.index:
             self.index[key] = len(self.points)
             self.points.append(key)
@@ -113,6 +113,14 @@ class Mesh:
         if uv is None and self.uv_size:
             uv = self.project(corners)
         self.uvs.append(uv or [(0, 0)] * len(corners))
+
+    def split(self, wanted):
+        """Two meshes: the faces whose material is `wanted`, and the rest without texture coordinates."""
+        parts = Mesh(1, self.digits), Mesh(None, self.digits)
+        for (face, material, hole), uv in zip(self.faces, self.uvs):
+            part = parts[0 if wanted(material) else 1]
+            part.face([self.points[i] for i in face], material, hole, uv if part.uv_size else None)
+        return parts
 
     def project(self, corners):
         n = [0.0, 0.0, 0.0]
