@@ -14,14 +14,14 @@ OPENING = (50, 165)             # half width and height of a window
 
 def window_frame(mesh, bars=(55, 110), paint="WhitePaint", stone="Stone"):
     w, h = OPENING
-    room(mesh, (-w, 0, 0), (w, 22, h), stone, "y-y+")
+    room(mesh, (-w, 0, 0), (w, 11, h), stone, "y-y+")
     for lo, hi in (((-w - 12, -5, -3), (-w, 0, h + 14)), ((w, -5, -3), (w + 12, 0, h + 14)), ((-w, -5, h), (w, 0, h + 14))):
         box(mesh, lo, hi, stone, "y+")
     box(mesh, (-w - 16, -14, -10), (w + 16, 0, -3), stone, "y+")
     for x in (-w + 3, 0, w - 3):
-        box(mesh, (x - 3, 11, 0), (x + 3, 16, h), paint, "z-z+y+")
+        box(mesh, (x - 3, 4, 0), (x + 3, 9, h), paint, "z-z+y+")
     for z in (3, *bars, h - 3):
-        box(mesh, (-w, 11.5, z - 2.5), (w, 15.5, z + 2.5), paint, "x-x+y+")
+        box(mesh, (-w, 4.5, z - 2.5), (w, 8.5, z + 2.5), paint, "x-x+y+")
 
 
 def windows(folder):
@@ -34,7 +34,7 @@ def windows(folder):
             mesh = Mesh()
             window_frame(mesh)
             mesh.write(layer, "Frame")
-            light(layer, "RectLight", "Curtain", (0, 21, h / 2), TO_STREET, kelvin, width=2 * w, height=h,
+            light(layer, "RectLight", "Curtain", (0, 10.5, h / 2), TO_STREET, kelvin, width=2 * w, height=h,
                   intensity=nits, texture=f"../textures/curtain_{drape}.png")
     rooms = {"RoomWarm": (2700, "Interior", 6.0), "RoomTelevision": (9000, "PlasterBlue", 2.6),
              "RoomStudy": (3000, "PlasterOxide", 7.0)}
@@ -42,12 +42,12 @@ def windows(folder):
         with layer.root(name):
             mesh = Mesh(uv_size=300)
             window_frame(mesh, (110,))
-            room(mesh, (-95, 22, -40), (95, 200, 215), walls, "y-", floor="Timber")
+            room(mesh, (-95, 11, -40), (95, 190, 215), walls, "y-", floor="Timber")
             for x, wide, top in ((-70, 44, 120), (30, 55, 70)):
-                box(mesh, (x, 165, -40), (x + wide, 198, top), "Timber", "z-")
-            box(mesh, (-20, 196, 95), (22, 199, 150), "Brass")
-            box(mesh, (-w - 2, 22.5, 0), (-w + 22, 26, h), "ClothCream")
-            box(mesh, (w - 22, 22.5, 0), (w + 2, 26, h), "ClothCream")
+                box(mesh, (x, 155, -40), (x + wide, 188, top), "Timber", "z-")
+            box(mesh, (-20, 186, 95), (22, 189, 150), "Brass")
+            box(mesh, (-w - 2, 11.5, 0), (-w + 18, 15, h), "ClothCream")
+            box(mesh, (w - 18, 11.5, 0), (w + 2, 15, h), "ClothCream")
             tube(mesh, [(12, 95, 215), (12, 95, 158)], 0.8, 3, "Iron")
             turned(mesh, [(20, 142), (6, 158)], 10, "ClothCream", (12, 95, 0))
             mesh.write(layer, "Room")
@@ -55,12 +55,12 @@ def windows(folder):
     with layer.root("Dark"):
         mesh = Mesh()
         window_frame(mesh)
-        mesh.face([(-w, 14, 0), (w, 14, 0), (w, 14, h), (-w, 14, h)], "Glass")
+        mesh.face([(-w, 7, 0), (w, 7, 0), (w, 7, h), (-w, 7, h)], "Glass")
         mesh.write(layer, "Frame")
     with layer.root("Shuttered"):
         mesh = Mesh()
         window_frame(mesh)
-        mesh.face([(-w, 14, 0), (w, 14, 0), (w, 14, h), (-w, 14, h)], "Glass")
+        mesh.face([(-w, 7, 0), (w, 7, 0), (w, 7, h), (-w, 7, h)], "Glass")
         for side in (-1, 1):
             x = side * (w + 27)
             box(mesh, (x - 26, -5, 0), (x + 26, -1, h), "GreenPaint")
@@ -121,7 +121,7 @@ def arch(mesh, x0, x1, pier, spring, top, material, deep=42):
     mesh.face([(x, deep, z) for x, z in outline[::-1]], material)
 
 
-def shop(layer, mesh, dice, x0, x1, name, style):
+def shop(layer, mesh, dice, x0, x1, name, style, stocked):
     """A shop window with shelves and ceiling lights, a sign board with spots, perhaps an awning."""
     paint = style["paint"]
     top = 272
@@ -134,17 +134,25 @@ def shop(layer, mesh, dice, x0, x1, name, style):
         box(mesh, (x - 4, 6, 40), (x + 4, 16, top), paint, "z-z+")
     box(mesh, (x0, 7, 222), (x1, 15, 229), paint, "x-x+")
     box(mesh, (x0 - 10, -8, 30), (x1 + 10, 0, 40), paint, "y+")
-    for z in (95, 150, 205):
+    wares = ["ColourA", "ColourB", "ColourC", "ClothCream", "ClothRed", "Brass"]
+    for z in (95, 150, 205) if stocked else ():
         box(mesh, (x0, 232, z), (x1, 266, z + 4), "Timber", "y+")
         x = x0 + 8
         while x < x1 - 24:
             wide, tall = dice(8, 20), dice(14, 40)
-            box(mesh, (x, 238, z + 4), (x + wide, 258, z + 4 + tall),
-                dice.pick(["ColourA", "ColourB", "ColourC", "ClothCream", "ClothRed", "Brass"]), "z-y+")
+            box(mesh, (x, 238, z + 4), (x + wide, 258, z + 4 + tall), dice.pick(wares), "z-y+")
             x += wide + dice(3, 16)
+        for wall_x, side in ((x0 - 20, 1), (x1 + 20, -1)):  # the side walls, which a passer-by sees first
+            a, b = sorted((wall_x, wall_x + side * 30))
+            box(mesh, (a, 60, z), (b, 228, z + 4), "Timber")
+            y = 66
+            while y < 205:
+                deep, tall = dice(9, 20), dice(14, 40)
+                box(mesh, (a + 3, y, z + 4), (b - 3, y + deep, z + 4 + tall), dice.pick(wares), "z-")
+                y += deep + dice(3, 14)
     box(mesh, (x0 + 20, 110, 0), (x1 - 30, 160, 92), "Timber", "z-")
     x = x0 + 6
-    while x < x1 - 30:                                     # the display behind the glass
+    while stocked and x < x1 - 30:                         # the display behind the glass
         wide, tall = dice(14, 30), dice(16, 60)
         box(mesh, (x, 26, 40), (x + wide, 52, 40 + tall), dice.pick(["ColourA", "ColourB", "ColourC", "ClothCream", "Timber"]), "z-")
         x += wide + dice(8, 40)
@@ -228,8 +236,8 @@ LIT = ["CurtainAmber", "CurtainCream", "RoomWarm", "CurtainRose", "RoomStudy", "
        "CurtainDim", "RoomTelevision", "CurtainCream"]
 
 
-def house(layer, name, at, turn, seed, bays, floors, ground, plaster, style):
-    """Returns its width. `style` has the shop's paint, board, awning, kelvin and nits."""
+def house(layer, name, at, turn, seed, bays, floors, ground, plaster, style, stocked=False):
+    """Returns its width. Only a `stocked` shop has wares. `style` has the shop's paint, board, awning, kelvin and nits."""
     dice = Dice(seed)
     bay = round(dice(168, 186))
     width, height = bays * bay, GROUND + floors * 300 + 30
@@ -247,7 +255,7 @@ def house(layer, name, at, turn, seed, bays, floors, ground, plaster, style):
             x0, x1 = (34, width - side) if dice() < 0.5 else (side, width - 34)
             d = (x1 + width) / 2 - 4 if x0 < 50 else x0 / 2 + 4
             wall(mesh, 0, 0, width, GROUND, [(x0, 40, x1, 272), (d - 48, 0, d + 48, 250)], style["front"])
-            shop(layer, mesh, dice, x0, x1, "Shop", style)
+            shop(layer, mesh, dice, x0, x1, "Shop", style, stocked)
             door(layer, mesh, d, "Door", style["paint"])
         elif ground == "arcade":
             arcade(layer, mesh, dice, width, bays, "Stone")
@@ -312,7 +320,7 @@ def write(folder):
             for i, (bays, floors, ground, plaster) in enumerate(row):
                 spot = (lambda w, y=y: (-520, y, 0)) if side == "Left" else (lambda w, y=y: (520, y + w, 0))
                 y += house(layer, f"{side}_{i + 1:02}", spot, 90 if side == "Left" else -90,
-                           i * 2 + (side == "Right") + 11, bays, floors, ground, plaster, SHOPS[(i * 3 + len(side)) % 4])
+                           i * 2 + (side == "Right") + 11, bays, floors, ground, plaster, SHOPS[(i * 3 + len(side)) % 4], i < 5)
         for i, (x, bays, plaster) in enumerate(((-1000, 3, "PlasterIvory"), (-470, 3, "PlasterRose"),
                                                 (70, 2, "PlasterOchre"), (430, 3, "PlasterGrey"))):
             house(layer, f"End_{i + 1:02}", lambda w, x=x: (x, 6700, 0), 0, 91 + i, bays, 3, "arcade" if i == 1 else "plain",

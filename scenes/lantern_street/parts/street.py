@@ -20,10 +20,10 @@ def depth(x, y):
 
 
 def roadway(layer):
-    xs = [-KERB + 2 * KERB * i / 46 for i in range(47)]
+    xs = [-KERB + 2 * KERB * i / 42 for i in range(43)]
     ys, y = [START], START
     while y < END:                                         # finest where the camera looks: its picture begins at y = 300
-        y += 120 if y < 200 else 14 + max(0, y - 800) * 0.035
+        y += 120 if y < 200 else 14 + max(0, y - 800) * 0.045
         ys.append(min(y, END))
     mesh, normals, uvs = Mesh(digits=2), [], []
     for y in ys:

@@ -71,7 +71,7 @@ def lantern_rows(layer):
     row, y = 0, 470.0
     while y < 6300:
         a, b = (-516, y + dice(-60, 60), 610 + dice(-40, 50)), (516, y + dice(-60, 60), 610 + dice(-40, 50))
-        path = hanging(a, b, dice(60, 105), 16)
+        path = hanging(a, b, dice(60, 105), 12)
         tube(cables, path, 0.7, 3, "Iron", caps=False)
         beads = resample(path, 104 if y < 3000 else 150)[1:-1]
         for k, (x, yy, z) in enumerate(beads):
@@ -109,7 +109,7 @@ def bulbs(folder):
 def festoons(layer):
     dice, spots, cables = Dice(31), [], Mesh()
     def string(a, b, sag, step):
-        path = hanging(a, b, sag, 14)
+        path = hanging(a, b, sag, 10)
         tube(cables, path, 0.6, 3, "Rubber", caps=False)
         spots.extend(resample(path, step)[1:-1])
     for side in (-1, 1):                                   # along the fronts

@@ -174,11 +174,11 @@ def paper(width=96, height=64):
 
 
 def sky(width=64, height=32):
-    """Blue hour: deep zenith, a paler band with a rest of dusk low in +Y (the street's end)."""
+    """Blue hour: deep zenith, a paler band with a rest of dusk low at u = 0, the street's end."""
     v = (np.arange(height) + 0.5) / height * np.pi                    # from the zenith
     u = (np.arange(width) + 0.5) / width
     up = np.cos(v)[:, None]
-    dusk = np.exp(-((up.clip(0) / 0.30) ** 2)) * (0.55 + 0.45 * np.cos((u[None, :] - 0.5) * 2 * np.pi))
+    dusk = np.exp(-((up.clip(0) / 0.30) ** 2)) * (0.55 + 0.45 * np.cos(u[None, :] * 2 * np.pi))
     zenith, band, low = np.array([0.09, 0.17, 0.45]), np.array([0.26, 0.42, 0.85]), np.array([0.95, 0.60, 0.52])
     t = np.clip(up, 0, 1)[..., None] ** 0.6
     image = zenith * t + band * (1 - t) + 0.35 * low * (dusk ** 2)[..., None]
