@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Writes the two tiny PNGs of the test room. `test_room.usda` is written by hand.
 
-    python scenes/test_room/make_textures.py
+python scenes/test_room/make_textures.py
 """
 
 import struct
@@ -11,11 +11,17 @@ from pathlib import Path
 
 def save(path, rows):
     """8-bit RGB; `rows` of (r, g, b) in 0..255, the top row first."""
+
     def chunk(tag, body):
         return struct.pack(">I", len(body)) + tag + body + struct.pack(">I", zlib.crc32(tag + body))
+
     data = b"".join(b"\0" + bytes(c for texel in row for c in texel) for row in rows)
-    path.write_bytes(b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", struct.pack(">IIBBBBB", len(rows[0]), len(rows), 8, 2, 0, 0, 0))
-                     + chunk(b"IDAT", zlib.compress(data, 9)) + chunk(b"IEND", b""))
+    path.write_bytes(
+        b"\x89PNG\r\n\x1a\n"
+        + chunk(b"IHDR", struct.pack(">IIBBBBB", len(rows[0]), len(rows), 8, 2, 0, 0, 0))
+        + chunk(b"IDAT", zlib.compress(data, 9))
+        + chunk(b"IEND", b"")
+    )
 
 
 def panel(x, y):

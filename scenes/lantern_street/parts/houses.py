@@ -5,17 +5,22 @@ import math
 from .shapes import arc, box, room, tube, turned
 from .usda import Dice, Layer, Mesh, light, place
 
-TO_STREET = (90, 0, 180)        # turns a rect light, which looks down -Z, to look along -Y, upright
-GROUND = 380                    # height of the ground floor
-OPENING = (50, 165)             # half width and height of a window
+TO_STREET = (90, 0, 180)  # turns a rect light, which looks down -Z, to look along -Y, upright
+GROUND = 380  # height of the ground floor
+OPENING = (50, 165)  # half width and height of a window
 
 
 # ---- windows: small assets, instanced by reference, with their lights inside ----
 
+
 def window_frame(mesh, bars=(55, 110), paint="WhitePaint", stone="Stone"):
     w, h = OPENING
     room(mesh, (-w, 0, 0), (w, 11, h), stone, "y-y+")
-    for lo, hi in (((-w - 12, -5, -3), (-w, 0, h + 14)), ((w, -5, -3), (w + 12, 0, h + 14)), ((-w, -5, h), (w, 0, h + 14))):
+    for lo, hi in (
+        ((-w - 12, -5, -3), (-w, 0, h + 14)),
+        ((w, -5, -3), (w + 12, 0, h + 14)),
+        ((-w, -5, h), (w, 0, h + 14)),
+    ):
         box(mesh, lo, hi, stone, "y+")
     box(mesh, (-w - 16, -14, -10), (w + 16, 0, -3), stone, "y+")
     for x in (-w + 3, 0, w - 3):
@@ -27,17 +32,34 @@ def window_frame(mesh, bars=(55, 110), paint="WhitePaint", stone="Stone"):
 def windows(folder):
     layer = Layer("assets/windows.usda", "Window prototypes, referenced instanceable. Written by make.py.")
     w, h = OPENING
-    curtains = {"CurtainAmber": (1, 2600, 1.9), "CurtainCream": (2, 3300, 1.5), "CurtainRose": (2, 2100, 1.1),
-                "CurtainDim": (1, 2300, 0.5)}
+    curtains = {
+        "CurtainAmber": (1, 2600, 1.9),
+        "CurtainCream": (2, 3300, 1.5),
+        "CurtainRose": (2, 2100, 1.1),
+        "CurtainDim": (1, 2300, 0.5),
+    }
     for name, (drape, kelvin, nits) in curtains.items():
         with layer.root(name):
             mesh = Mesh()
             window_frame(mesh)
             mesh.write(layer, "Frame")
-            light(layer, "RectLight", "Curtain", (0, 10.5, h / 2), TO_STREET, kelvin, width=2 * w, height=h,
-                  intensity=nits, texture=f"../textures/curtain_{drape}.png")
-    rooms = {"RoomWarm": (2700, "Interior", 6.0), "RoomTelevision": (9000, "PlasterBlue", 2.6),
-             "RoomStudy": (3000, "PlasterOxide", 7.0)}
+            light(
+                layer,
+                "RectLight",
+                "Curtain",
+                (0, 10.5, h / 2),
+                TO_STREET,
+                kelvin,
+                width=2 * w,
+                height=h,
+                intensity=nits,
+                texture=f"../textures/curtain_{drape}.png",
+            )
+    rooms = {
+        "RoomWarm": (2700, "Interior", 6.0),
+        "RoomTelevision": (9000, "PlasterBlue", 2.6),
+        "RoomStudy": (3000, "PlasterOxide", 7.0),
+    }
     for name, (kelvin, walls, exposure) in rooms.items():
         with layer.root(name):
             mesh = Mesh(uv_size=300)
@@ -51,7 +73,9 @@ def windows(folder):
             tube(mesh, [(12, 95, 215), (12, 95, 158)], 0.8, 3, "Iron")
             turned(mesh, [(20, 142), (6, 158)], 10, "ClothCream", (12, 95, 0))
             mesh.write(layer, "Room")
-            light(layer, "SphereLight", "Pendant", (12, 95, 138), None, kelvin, radius=8, intensity=1, exposure=exposure)
+            light(
+                layer, "SphereLight", "Pendant", (12, 95, 138), None, kelvin, radius=8, intensity=1, exposure=exposure
+            )
     with layer.root("Dark"):
         mesh = Mesh()
         window_frame(mesh)
@@ -91,12 +115,19 @@ def leaves(mesh, dice, lo, hi, count, size=9, material="Leaf", flower="ClothRed"
         turn, lean, s = dice(0, 2 * math.pi), dice(-0.9, 0.9), size * dice(0.7, 1.3)
         a = (math.cos(turn) * s, math.sin(turn) * s, lean * s)
         b = (-math.sin(turn) * s * 0.5, math.cos(turn) * s * 0.5, dice(0.2, 0.8) * s)
-        mesh.face([tuple(c[i] - a[i] for i in range(3)), tuple(c[i] - b[i] for i in range(3)),
-                   tuple(c[i] + a[i] for i in range(3)), tuple(c[i] + b[i] for i in range(3))],
-                  flower if k % 6 == 5 else material)
+        mesh.face(
+            [
+                tuple(c[i] - a[i] for i in range(3)),
+                tuple(c[i] - b[i] for i in range(3)),
+                tuple(c[i] + a[i] for i in range(3)),
+                tuple(c[i] + b[i] for i in range(3)),
+            ],
+            flower if k % 6 == 5 else material,
+        )
 
 
 # ---- walls ----
+
 
 def wall(mesh, x0, z0, x1, z1, openings, material):
     """A grid of quads over the front; the openings (x0, z0, x1, z1) are marked as holes, not cut out."""
@@ -152,20 +183,45 @@ def shop(layer, mesh, dice, x0, x1, name, style, stocked):
                 y += deep + dice(3, 14)
     box(mesh, (x0 + 20, 110, 0), (x1 - 30, 160, 92), "Timber", "z-")
     x = x0 + 6
-    while stocked and x < x1 - 30:                         # the display behind the glass
+    while stocked and x < x1 - 30:  # the display behind the glass
         wide, tall = dice(14, 30), dice(16, 60)
-        box(mesh, (x, 26, 40), (x + wide, 52, 40 + tall), dice.pick(["ColourA", "ColourB", "ColourC", "ClothCream", "Timber"]), "z-")
+        box(
+            mesh,
+            (x, 26, 40),
+            (x + wide, 52, 40 + tall),
+            dice.pick(["ColourA", "ColourB", "ColourC", "ClothCream", "Timber"]),
+            "z-",
+        )
         x += wide + dice(8, 40)
     for k in range(count):
         x = x0 + (x1 - x0) * (k + 0.5) / count
-        light(layer, "RectLight", f"{name}_Ceiling{k}", (x, 120, 297), (0, 0, 0), style["kelvin"], width=90, height=36,
-              intensity=style["nits"])
+        light(
+            layer,
+            "RectLight",
+            f"{name}_Ceiling{k}",
+            (x, 120, 297),
+            (0, 0, 0),
+            style["kelvin"],
+            width=90,
+            height=36,
+            intensity=style["nits"],
+        )
     box(mesh, (x0, -7, 312), (x1, 0, 360), style["board"], "y+")
     for k in range(count):
         x = x0 + (x1 - x0) * (k + 0.5) / count
         tube(mesh, [(x, 0, 385), (x, -42, 392), (x, -50, 384)], 1.3, 4, "Iron")
-        light(layer, "SphereLight", f"{name}_Spot{k}", (x, -52, 381), (48, 0, 0), 3000, (52, 0.6), radius=3,
-              intensity=1500, treatAsPoint=True)
+        light(
+            layer,
+            "SphereLight",
+            f"{name}_Spot{k}",
+            (x, -52, 381),
+            (48, 0, 0),
+            3000,
+            (52, 0.6),
+            radius=3,
+            intensity=1500,
+            treatAsPoint=True,
+        )
     if style["awning"]:
         stripes = round((x1 - x0 + 20) / 26)
         cloth = Mesh()
@@ -175,8 +231,10 @@ def shop(layer, mesh, dice, x0, x1, name, style, stocked):
             cloth.face([(a, -2, 308), (a, -125, 256), (b, -125, 256), (b, -2, 308)], material)
             cloth.face([(a, -2, 307), (b, -2, 307), (b, -125, 255), (a, -125, 255)], material)
             middle = (a + b) / 2
-            cloth.face([(a, -125.5, 256), (a, -125.5, 240), (middle, -125.5, 232), (b, -125.5, 240), (b, -125.5, 256)],
-                       material)
+            cloth.face(
+                [(a, -125.5, 256), (a, -125.5, 240), (middle, -125.5, 232), (b, -125.5, 240), (b, -125.5, 256)],
+                material,
+            )
         cloth.write(layer, f"{name}_Awning", body=["uniform bool doubleSided = 1"], left_handed=True)
 
 
@@ -186,8 +244,17 @@ def arcade(layer, mesh, dice, width, bays, material):
         arch(mesh, k * bay, (k + 1) * bay, 21, 205, GROUND, material)
         box(mesh, (k * bay - 24 if k else 0, -5, 0), (k * bay + 24, 0, 24), "Stone", "y+")
         box(mesh, (k * bay - 24 if k else 0, -4, 200), (k * bay + 24, 0, 210), "Stone", "y+")
-        light(layer, "CylinderLight", f"Tube{k}", ((k + 0.5) * bay, 150, 322), (0, 0, 0), 3400 if k % 2 else 2700,
-              length=bay * 0.5, radius=2.2, intensity=38)
+        light(
+            layer,
+            "CylinderLight",
+            f"Tube{k}",
+            ((k + 0.5) * bay, 150, 322),
+            (0, 0, 0),
+            3400 if k % 2 else 2700,
+            length=bay * 0.5,
+            radius=2.2,
+            intensity=38,
+        )
     room(mesh, (0, 42, 0), (width, 260, 335), "Interior", "y-", floor="Flags")
     for k in range(bays):
         x = (k + 0.5) * bay
@@ -217,14 +284,42 @@ def roof(mesh, width, height, depth, rise, material, chimneys, body):
         mesh.face(gable[::-1] if flip else gable, body)
     mesh.face([(width, depth, 0), (0, depth, 0), (0, depth, height), (width, depth, height)], body)
     eaves = rise * 36 / (depth / 2)
-    mesh.face([(-4, -36, height - eaves), (width + 4, -36, height - eaves), (width + 4, depth / 2, height + rise),
-               (-4, depth / 2, height + rise)], material)
-    mesh.face([(width + 4, depth, height), (-4, depth, height), (-4, depth / 2, height + rise),
-               (width + 4, depth / 2, height + rise)], material)
-    mesh.face([(-4, -36, height - eaves - 8), (-4, 0, height - eaves - 8), (width + 4, 0, height - eaves - 8),
-               (width + 4, -36, height - eaves - 8)], "Timber")
-    mesh.face([(-4, -36, height - eaves - 8), (width + 4, -36, height - eaves - 8), (width + 4, -36, height - eaves),
-               (-4, -36, height - eaves)], "Timber")
+    mesh.face(
+        [
+            (-4, -36, height - eaves),
+            (width + 4, -36, height - eaves),
+            (width + 4, depth / 2, height + rise),
+            (-4, depth / 2, height + rise),
+        ],
+        material,
+    )
+    mesh.face(
+        [
+            (width + 4, depth, height),
+            (-4, depth, height),
+            (-4, depth / 2, height + rise),
+            (width + 4, depth / 2, height + rise),
+        ],
+        material,
+    )
+    mesh.face(
+        [
+            (-4, -36, height - eaves - 8),
+            (-4, 0, height - eaves - 8),
+            (width + 4, 0, height - eaves - 8),
+            (width + 4, -36, height - eaves - 8),
+        ],
+        "Timber",
+    )
+    mesh.face(
+        [
+            (-4, -36, height - eaves - 8),
+            (width + 4, -36, height - eaves - 8),
+            (width + 4, -36, height - eaves),
+            (-4, -36, height - eaves),
+        ],
+        "Timber",
+    )
     for x in chimneys:
         base = height + rise * 0.55
         box(mesh, (x - 32, depth * 0.25, base - 60), (x + 32, depth * 0.25 + 55, height + rise + 90), "Brick", "z-")
@@ -232,8 +327,18 @@ def roof(mesh, width, height, depth, rise, material, chimneys, body):
             turned(mesh, [(9, 0), (7, 30)], 7, "Terracotta", (x + s, depth * 0.25 + 27, height + rise + 90))
 
 
-LIT = ["CurtainAmber", "CurtainCream", "RoomWarm", "CurtainRose", "RoomStudy", "CurtainAmber", "RoomWarm",
-       "CurtainDim", "RoomTelevision", "CurtainCream"]
+LIT = [
+    "CurtainAmber",
+    "CurtainCream",
+    "RoomWarm",
+    "CurtainRose",
+    "RoomStudy",
+    "CurtainAmber",
+    "RoomWarm",
+    "CurtainDim",
+    "RoomTelevision",
+    "CurtainCream",
+]
 
 
 def house(layer, name, at, turn, seed, bays, floors, ground, plaster, style, stocked=False):
@@ -273,9 +378,9 @@ def house(layer, name, at, turn, seed, bays, floors, ground, plaster, style, sto
             box(mesh, (0, -3, 0), (width, 0, 26), "DarkStone", "y+z-x-x+")
         box(mesh, (0, -9, GROUND - 12), (width, 0, GROUND + 8), "Stone", "y+")
         box(mesh, (0, -16, height - 26), (width, 0, height - 6), "Stone", "y+")
-        stacks = [60 + dice() * 60, width - 60 - dice() * 90][:1 + (bays > 3)]
+        stacks = [60 + dice() * 60, width - 60 - dice() * 90][: 1 + (bays > 3)]
         roof(mesh, width, height, 700, dice(200, 330), "Slate" if seed % 3 else "Tile", stacks, plaster)
-        box(mesh, (width - 7, -9, 12), (width + 2, -1, height - 20), "Iron", "z-z+")   # downpipe
+        box(mesh, (width - 7, -9, 12), (width + 2, -1, height - 20), "Iron", "z-z+")  # downpipe
         walls, trim = mesh.split(lambda m: m.startswith("Plaster") or m == "Brick")
         walls.write(layer, "Walls")
         trim.write(layer, "Trim")
@@ -289,8 +394,9 @@ def house(layer, name, at, turn, seed, bays, floors, ground, plaster, style, sto
 
 
 def pane(layer, kind, name, at):
-    with layer.prim("Xform", name, ["instanceable = true", f"prepend references = @../assets/windows.usda@</{kind}>"],
-                    place(at)):
+    with layer.prim(
+        "Xform", name, ["instanceable = true", f"prepend references = @../assets/windows.usda@</{kind}>"], place(at)
+    ):
         pass
 
 
@@ -301,14 +407,34 @@ SHOPS = [
     dict(paint="Timber", board="Timber", awning="ClothRed", front="Brick", kelvin=2700, nits=16),
 ]
 # bays, floors, ground floor, front; from the camera to the end of the street
-LEFT = [(3, 3, "plain", "PlasterIvory"), (3, 3, "shop", "PlasterRose"), (4, 2, "arcade", "PlasterOchre"),
-        (3, 3, "shop", "PlasterBlue"), (3, 3, "plain", "Brick"), (4, 2, "arcade", "PlasterIvory"),
-        (3, 3, "shop", "PlasterSage"), (3, 3, "plain", "PlasterOxide"), (4, 3, "shop", "PlasterGrey"),
-        (3, 2, "arcade", "PlasterRose"), (3, 3, "plain", "PlasterOchre"), (4, 3, "shop", "PlasterIvory")]
-RIGHT = [(3, 3, "plain", "PlasterGrey"), (4, 3, "shop", "PlasterOchre"), (3, 3, "shop", "Brick"),
-         (3, 2, "plain", "PlasterSage"), (4, 3, "arcade", "PlasterRose"), (3, 3, "shop", "PlasterIvory"),
-         (3, 3, "shop", "PlasterBlue"), (4, 2, "plain", "PlasterOchre"), (3, 3, "arcade", "PlasterGrey"),
-         (3, 3, "shop", "PlasterRose"), (4, 3, "plain", "PlasterOxide"), (3, 3, "shop", "PlasterOchre")]
+LEFT = [
+    (3, 3, "plain", "PlasterIvory"),
+    (3, 3, "shop", "PlasterRose"),
+    (4, 2, "arcade", "PlasterOchre"),
+    (3, 3, "shop", "PlasterBlue"),
+    (3, 3, "plain", "Brick"),
+    (4, 2, "arcade", "PlasterIvory"),
+    (3, 3, "shop", "PlasterSage"),
+    (3, 3, "plain", "PlasterOxide"),
+    (4, 3, "shop", "PlasterGrey"),
+    (3, 2, "arcade", "PlasterRose"),
+    (3, 3, "plain", "PlasterOchre"),
+    (4, 3, "shop", "PlasterIvory"),
+]
+RIGHT = [
+    (3, 3, "plain", "PlasterGrey"),
+    (4, 3, "shop", "PlasterOchre"),
+    (3, 3, "shop", "Brick"),
+    (3, 2, "plain", "PlasterSage"),
+    (4, 3, "arcade", "PlasterRose"),
+    (3, 3, "shop", "PlasterIvory"),
+    (3, 3, "shop", "PlasterBlue"),
+    (4, 2, "plain", "PlasterOchre"),
+    (3, 3, "arcade", "PlasterGrey"),
+    (3, 3, "shop", "PlasterRose"),
+    (4, 3, "plain", "PlasterOxide"),
+    (3, 3, "shop", "PlasterOchre"),
+]
 
 
 def write(folder):
@@ -319,12 +445,34 @@ def write(folder):
             y = -620.0 if side == "Left" else -560.0
             for i, (bays, floors, ground, plaster) in enumerate(row):
                 spot = (lambda w, y=y: (-520, y, 0)) if side == "Left" else (lambda w, y=y: (520, y + w, 0))
-                y += house(layer, f"{side}_{i + 1:02}", spot, 90 if side == "Left" else -90,
-                           i * 2 + (side == "Right") + 11, bays, floors, ground, plaster, SHOPS[(i * 3 + len(side)) % 4], i < 5)
-        for i, (x, bays, plaster) in enumerate(((-1000, 3, "PlasterIvory"), (-470, 3, "PlasterRose"),
-                                                (70, 2, "PlasterOchre"), (430, 3, "PlasterGrey"))):
-            house(layer, f"End_{i + 1:02}", lambda w, x=x: (x, 6700, 0), 0, 91 + i, bays, 3, "arcade" if i == 1 else "plain",
-                  plaster, SHOPS[i])
+                y += house(
+                    layer,
+                    f"{side}_{i + 1:02}",
+                    spot,
+                    90 if side == "Left" else -90,
+                    i * 2 + (side == "Right") + 11,
+                    bays,
+                    floors,
+                    ground,
+                    plaster,
+                    SHOPS[(i * 3 + len(side)) % 4],
+                    i < 5,
+                )
+        for i, (x, bays, plaster) in enumerate(
+            ((-1000, 3, "PlasterIvory"), (-470, 3, "PlasterRose"), (70, 2, "PlasterOchre"), (430, 3, "PlasterGrey"))
+        ):
+            house(
+                layer,
+                f"End_{i + 1:02}",
+                lambda w, x=x: (x, 6700, 0),
+                0,
+                91 + i,
+                bays,
+                3,
+                "arcade" if i == 1 else "plain",
+                plaster,
+                SHOPS[i],
+            )
         tower(layer)
     layer.save(folder)
 
@@ -336,7 +484,12 @@ def tower(layer):
         box(mesh, (-260, -260, 0), (260, 260, 2300), "PlasterIvory", "z-")
         for z in (1500, 1880, 2280):
             box(mesh, (-285, -285, z), (285, 285, z + 26), "Stone")
-        for a, b in (((-300, -300), (300, -300)), ((300, -300), (300, 300)), ((300, 300), (-300, 300)), ((-300, 300), (-300, -300))):
+        for a, b in (
+            ((-300, -300), (300, -300)),
+            ((300, -300), (300, 300)),
+            ((300, 300), (-300, 300)),
+            ((-300, 300), (-300, -300)),
+        ):
             mesh.face([(*a, 2300), (*b, 2300), (0, 0, 3500)], "Slate")
         turned(mesh, [(0, 3490), (5, 3491), (2, 3640), (0, 3641)], 6, "Brass")
         for k in range(12):
@@ -346,4 +499,6 @@ def tower(layer):
         tube(mesh, [(0, -292, 2080), (52, -292, 2120)], 6, 4, "Board")
         tube(mesh, [(0, -292, 2080), (-18, -292, 2180)], 4, 4, "Board")
         mesh.write(layer, "Stones")
-        light(layer, "DiskLight", "Dial", (0, -270, 2080), TO_STREET, 4300, radius=140, normalize=True, intensity=140000)
+        light(
+            layer, "DiskLight", "Dial", (0, -270, 2080), TO_STREET, 4300, radius=140, normalize=True, intensity=140000
+        )

@@ -12,7 +12,9 @@ def glass(layer, name, strokes, radius, step, color, nits, y=-9, closed=False, s
     for stroke in strokes:
         path = [(px, y, pz) for px, pz in resample(stroke + stroke[:1] if closed else stroke, step)]
         tube(mesh, path[:-1] if closed else path, radius, sides, "Tube", closed=closed)
-    mesh.write(layer, name, body=[f"color3f inputs:color = {vec(color)}", f"float inputs:intensity = {nits}"], light=True)
+    mesh.write(
+        layer, name, body=[f"color3f inputs:color = {vec(color)}", f"float inputs:intensity = {nits}"], light=True
+    )
     return mesh.triangles()
 
 
@@ -34,8 +36,16 @@ def blade(folder):
             strokes += letter(name, -size / 3, TALL - 190 - k * pitch, size)
         count += glass(layer, "Letters", [[(2.3 * x, z) for x, z in s] for s in strokes], 2.2, 3.4, PINK, 11)
         w, r = WIDE / 2 - 5, 14
-        frame = [(-w + r, 5), (w - r, 5), (w, 5 + r), (w, TALL - 5 - r), (w - r, TALL - 5), (-w + r, TALL - 5),
-                 (-w, TALL - 5 - r), (-w, 5 + r)]
+        frame = [
+            (-w + r, 5),
+            (w - r, 5),
+            (w, 5 + r),
+            (w, TALL - 5 - r),
+            (w - r, TALL - 5),
+            (-w + r, TALL - 5),
+            (-w, TALL - 5 - r),
+            (-w, 5 + r),
+        ]
         count += glass(layer, "Frame", [frame], 1.4, 8.0, CYAN, 6, closed=True)
     layer.save(folder)
     return count
@@ -45,7 +55,9 @@ def small(layer, name, text, height, color, nits, at, turn, upright=False, frame
     """A word on a dark board; `upright` stacks the letters."""
     with layer.prim("Xform", name, body=place(at, turn)):
         if upright:
-            strokes = [s for k, c in enumerate(text) for s in letter(c, -height / 3, -(k + 1) * height * 1.28, height)]
+            strokes = [
+                s for k, c in enumerate(text) for s in letter(c, -height / 3, -(k + 1) * height * 1.28, height)
+            ]
             board = ((-height * 0.62, -len(text) * height * 1.28 - height * 0.35), (height * 0.62, height * 0.1))
         else:
             strokes, wide = word(text, 0, 0, height)
@@ -73,8 +85,12 @@ def write(folder):
                 box(mesh, (WIDE / 2, -2, z - 3), (95, 2, z + 3), "Iron", "x-x+")
             mesh.write(layer, "Board")
             for face, turn in (("Front", 0), ("Back", 180)):
-                with layer.prim("Xform", face, ["instanceable = true", "prepend references = @../assets/neon_candelabra.usda@"],
-                                place(None, turn)):
+                with layer.prim(
+                    "Xform",
+                    face,
+                    ["instanceable = true", "prepend references = @../assets/neon_candelabra.usda@"],
+                    place(None, turn),
+                ):
                     pass
         count += small(layer, "Hotel", "HOTEL", 34, CYAN, 9, (-446, 2260, 640), 0, True, BLUE)
         count += small(layer, "Bar", "BAR", 34, GREEN, 9, (455, 2450, 430), 0, True, None)
@@ -84,8 +100,11 @@ def write(folder):
         # The billboard: one mesh light with a textured emission, its rim black.
         with layer.prim("Xform", "HouseBillboard", body=place((-498, 1480, 520), 62)):
             mesh = Mesh()
-            mesh.face([(-150, -9, 0), (150, -9, 0), (150, -9, 131), (-150, -9, 131)], "HouseSignGlow",
-                      uv=[(0, 0), (1, 0), (1, 1), (0, 1)])
+            mesh.face(
+                [(-150, -9, 0), (150, -9, 0), (150, -9, 131), (-150, -9, 131)],
+                "HouseSignGlow",
+                uv=[(0, 0), (1, 0), (1, 1), (0, 1)],
+            )
             mesh.write(layer, "Poster", body=["float inputs:intensity = 2.4"], light=True)
             mesh = Mesh()
             box(mesh, (-156, -8, -6), (156, 4, 137), "Iron")
@@ -96,7 +115,16 @@ def write(folder):
             box(mesh, (-40, -5, -3), (40, 5, 137), "Board")
             box(mesh, (40, -2, 108), (70, 2, 114), "Iron", "x-x+")
             mesh.write(layer, "Case")
-            light(layer, "RectLight", "Face", (0, -5.6, 67), TO_STREET, width=76, height=133, intensity=3.2,
-                  texture="../textures/tea_sign.png")
+            light(
+                layer,
+                "RectLight",
+                "Face",
+                (0, -5.6, 67),
+                TO_STREET,
+                width=76,
+                height=133,
+                intensity=3.2,
+                texture="../textures/tea_sign.png",
+            )
     layer.save(folder)
     return count

@@ -39,9 +39,21 @@ def walkers(folder):
 
 
 CROWD = [  # kind, x, y, heading in degrees
-    (0, 210, 1180, 10), (1, 262, 1215, 0), (0, -20, 2060, 160), (2, 440, 905, 80), (2, 455, 1500, -100), (1, -430, 1420, 180),
-    (0, 120, 2500, 20), (2, 60, 3120, 0), (1, 150, 3180, 8), (0, -440, 2300, 0), (2, -452, 1890, 70), (0, 430, 2840, 180),
-    (1, 330, 4100, 0), (0, 300, 4160, 0), (2, -30, 4700, 180),
+    (0, 210, 1180, 10),
+    (1, 262, 1215, 0),
+    (0, -20, 2060, 160),
+    (2, 440, 905, 80),
+    (2, 455, 1500, -100),
+    (1, -430, 1420, 180),
+    (0, 120, 2500, 20),
+    (2, 60, 3120, 0),
+    (1, 150, 3180, 8),
+    (0, -440, 2300, 0),
+    (2, -452, 1890, 70),
+    (0, 430, 2840, 180),
+    (1, 330, 4100, 0),
+    (0, 300, 4160, 0),
+    (2, -30, 4700, 180),
 ]
 
 
@@ -49,8 +61,10 @@ def kiosk(layer):
     """A newspaper kiosk: six sides, tube lights inside."""
     with layer.prim("Xform", "Kiosk", body=place((-452, 1010, 12), 15)):
         mesh, dice = Mesh(), Dice(3)
+
         def hexagon(r):
             return [(r * math.cos(math.radians(60 * k)), r * math.sin(math.radians(60 * k))) for k in range(6)]
+
         prism(mesh, hexagon(72), 0, 12, "DarkStone")
         prism(mesh, hexagon(66), 12, 95, "GreenPaint", True, lid="Timber")
         prism(mesh, hexagon(70), 92, 98, "Brass", True)
@@ -58,13 +72,20 @@ def kiosk(layer):
         for k in range(6):
             (x0, y0), (x1, y1) = hexagon(64)[k], hexagon(64)[(k + 1) % 6]
             tube(mesh, [(x0, y0, 98), (x0, y0, 226)], 3, 5, "GreenPaint", caps=False)
-            for j in range(3):                             # papers on the counter rail
+            for j in range(3):  # papers on the counter rail
                 t0, t1 = 0.1 + j * 0.29, 0.1 + j * 0.29 + 0.24
                 a, b = [(x0 + (x1 - x0) * t, y0 + (y1 - y0) * t) for t in (t0, t1)]
                 z = 60 + dice(0, 6)
                 s = 1.06
-                mesh.face([(a[0] * s, a[1] * s, z - 34), (b[0] * s, b[1] * s, z - 34), (b[0] * s * 0.99, b[1] * s * 0.99, z),
-                           (a[0] * s * 0.99, a[1] * s * 0.99, z)], dice.pick(["ClothCream", "ColourA", "ColourB", "ColourC"]))
+                mesh.face(
+                    [
+                        (a[0] * s, a[1] * s, z - 34),
+                        (b[0] * s, b[1] * s, z - 34),
+                        (b[0] * s * 0.99, b[1] * s * 0.99, z),
+                        (a[0] * s * 0.99, a[1] * s * 0.99, z),
+                    ],
+                    dice.pick(["ClothCream", "ColourA", "ColourB", "ColourC"]),
+                )
         turned(mesh, [(88, 240), (70, 262), (34, 282), (12, 292), (10, 306), (0, 322)], 6, "GreenPaint")
         tube(mesh, [(0, 0, 12), (0, 0, 226)], 16, 6, "Timber", caps=False)
         turned(mesh, [(20, 98), (24, 140), (8, 152)], 8, "ClothDark", (26, -22, 0))
@@ -72,8 +93,17 @@ def kiosk(layer):
         mesh.write(layer, "Shell")
         for k in range(6):
             t = math.radians(60 * k + 30)
-            light(layer, "CylinderLight", f"Tube_{k + 1}", (46 * math.cos(t), 46 * math.sin(t), 221), (0, 0, 60 * k + 120), 4600,
-                  length=54, radius=1.6, intensity=60)
+            light(
+                layer,
+                "CylinderLight",
+                f"Tube_{k + 1}",
+                (46 * math.cos(t), 46 * math.sin(t), 221),
+                (0, 0, 60 * k + 120),
+                4600,
+                length=54,
+                radius=1.6,
+                intensity=60,
+            )
 
 
 def traffic_light(layer):
@@ -83,13 +113,27 @@ def traffic_light(layer):
         box(mesh, (-15, -26, 232), (15, -4, 328), "Board")
         for z in (250, 280, 310):
             turned(mesh, [(12.5, -0.1), (12.5, 0)], 3, "Iron", (0, -27, z))
-            hood = [(13 * math.cos(math.radians(a)), -26, z + 13 * math.sin(math.radians(a))) for a in range(0, 181, 30)]
+            hood = [
+                (13 * math.cos(math.radians(a)), -26, z + 13 * math.sin(math.radians(a))) for a in range(0, 181, 30)
+            ]
             for p, q in zip(hood, hood[1:]):
                 mesh.face([p, q, (q[0], -44, q[2]), (p[0], -44, p[2])], "Board")
         mesh.write(layer, "Post", body=["uniform bool doubleSided = 1"])
-        for z, color, nits in ((250, (0.05, 1, 0.35), 0.02), (280, (1, 0.45, 0.02), 0.03), (310, (1, 0.03, 0.015), 14)):
-            light(layer, "DiskLight", {250: "Green", 280: "Amber", 310: "Red"}[z], (0, -27.2, z), (90, 0, 180), color=color, radius=10.5,
-                  intensity=nits)
+        for z, color, nits in (
+            (250, (0.05, 1, 0.35), 0.02),
+            (280, (1, 0.45, 0.02), 0.03),
+            (310, (1, 0.03, 0.015), 14),
+        ):
+            light(
+                layer,
+                "DiskLight",
+                {250: "Green", 280: "Amber", 310: "Red"}[z],
+                (0, -27.2, z),
+                (90, 0, 180),
+                color=color,
+                radius=10.5,
+                intensity=nits,
+            )
 
 
 def bicycle(layer, name, at, turn):
@@ -100,8 +144,21 @@ def bicycle(layer, name, at, turn):
             tube(mesh, [(x + c, 0, 34 + s) for c, s in arc(0, 0, 32, 0, 342, 19)], 1.6, 4, "Rubber", closed=True)
             for k in range(6):
                 t = math.radians(30 * k)
-                tube(mesh, [(x - 31 * math.cos(t), 0, 34 - 31 * math.sin(t)), (x + 31 * math.cos(t), 0, 34 + 31 * math.sin(t))], 0.3, 3, "Steel")
-        for path in ([(-52, 34), (-6, 32), (36, 80), (-18, 82), (-6, 32)], [(-52, 34), (-18, 82), (-21, 94)], [(52, 34), (36, 80), (33, 98), (24, 102)]):
+                tube(
+                    mesh,
+                    [
+                        (x - 31 * math.cos(t), 0, 34 - 31 * math.sin(t)),
+                        (x + 31 * math.cos(t), 0, 34 + 31 * math.sin(t)),
+                    ],
+                    0.3,
+                    3,
+                    "Steel",
+                )
+        for path in (
+            [(-52, 34), (-6, 32), (36, 80), (-18, 82), (-6, 32)],
+            [(-52, 34), (-18, 82), (-21, 94)],
+            [(52, 34), (36, 80), (33, 98), (24, 102)],
+        ):
             tube(mesh, [(x, 0, z) for x, z in path], 1.6, 5, "RedPaint")
         tube(mesh, [(24, -24, 103), (33, 0, 99), (24, 24, 103)], 1.2, 4, "Steel")
         box(mesh, (-34, -7, 93), (-10, 7, 97), "Timber")
@@ -127,18 +184,32 @@ def cafe(layer, name, at):
 
 def clutter(layer):
     mesh, dice = Mesh(), Dice(12)
-    for x, y, z in ((474, 330, 12), (470, 382, 12), (476, 352, 50), (-478, 470, 12), (-476, 520, 12), (486, 2010, 12), (-480, 1660, 12)):
+    for x, y, z in (
+        (474, 330, 12),
+        (470, 382, 12),
+        (476, 352, 50),
+        (-478, 470, 12),
+        (-476, 520, 12),
+        (486, 2010, 12),
+        (-480, 1660, 12),
+    ):
         turn = dice(-4, 4)
         for k in range(4):
             box(mesh, (x - 28 + turn, y - 22, z + k * 9.5), (x + 28 + turn, y + 22, z + k * 9.5 + 7.5), "Timber")
         box(mesh, (x - 25 + turn, y - 20, z), (x + 25 + turn, y + 20, z + 33), "ColourC", "z-")
         for _ in range(7):
-            turned(mesh, ball_profile(6.5, 4), 6, dice.pick(["ColourA", "ClothRed", "ColourC"]), (x + turn + dice(-17, 17), y + dice(-13, 13), z + 37))
+            turned(
+                mesh,
+                ball_profile(6.5, 4),
+                6,
+                dice.pick(["ColourA", "ClothRed", "ColourC"]),
+                (x + turn + dice(-17, 17), y + dice(-13, 13), z + 37),
+            )
     for x, y in ((484, 640), (484, 1010), (-486, 330), (-484, 880), (486, 1560), (-484, 1990), (484, 2300)):
         turned(mesh, [(17, 0), (25, 40), (27, 44), (23, 44), (22, 38), (0, 38)], 10, "Terracotta", (x, y, 12))
         leaves(mesh, dice, (x - 26, y - 26, 52), (x + 26, y + 26, 118), 60, 11)
     mesh.write(layer, "Clutter", body=["uniform bool doubleSided = 1"])
-    hidden = Mesh()                                        # builders' scaffold, switched off
+    hidden = Mesh()  # builders' scaffold, switched off
     for x in (380, 520):
         for y in (300, 600, 900):
             box(hidden, (x - 5, y - 5, 0), (x + 5, y + 5, 900), "Steel")
@@ -149,8 +220,14 @@ def write(folder):
     walkers(folder)
     layer = Layer("layers/props.usda", "People and things in the street. Written by make.py.")
     with layer.root("Props", "group"):
-        instancer(layer, "Walkers", "walkers", ["WithUmbrella", "WithRedUmbrella", "InGreen"],
-                  [(k, (x, y, 12 if abs(x) > 370 else 1)) for k, x, y, _ in CROWD], [math.radians(t) for *_, t in CROWD])
+        instancer(
+            layer,
+            "Walkers",
+            "walkers",
+            ["WithUmbrella", "WithRedUmbrella", "InGreen"],
+            [(k, (x, y, 12 if abs(x) > 370 else 1)) for k, x, y, _ in CROWD],
+            [math.radians(t) for *_, t in CROWD],
+        )
         kiosk(layer)
         traffic_light(layer)
         bicycle(layer, "Bicycle_1", (497, 860, 12), -90)

@@ -7,9 +7,12 @@ def box(mesh, lo, hi, material, skip=""):
     """An axis-aligned box; `skip` leaves out sides, e.g. "z-x+"."""
     (a, b, c), (d, e, f) = lo, hi
     sides = {
-        "x-": [(a, e, c), (a, b, c), (a, b, f), (a, e, f)], "x+": [(d, b, c), (d, e, c), (d, e, f), (d, b, f)],
-        "y-": [(a, b, c), (d, b, c), (d, b, f), (a, b, f)], "y+": [(d, e, c), (a, e, c), (a, e, f), (d, e, f)],
-        "z-": [(a, e, c), (d, e, c), (d, b, c), (a, b, c)], "z+": [(a, b, f), (d, b, f), (d, e, f), (a, e, f)],
+        "x-": [(a, e, c), (a, b, c), (a, b, f), (a, e, f)],
+        "x+": [(d, b, c), (d, e, c), (d, e, f), (d, b, f)],
+        "y-": [(a, b, c), (d, b, c), (d, b, f), (a, b, f)],
+        "y+": [(d, e, c), (a, e, c), (a, e, f), (d, e, f)],
+        "z-": [(a, e, c), (d, e, c), (d, b, c), (a, b, c)],
+        "z+": [(a, b, f), (d, b, f), (d, e, f), (a, e, f)],
     }
     for name, corners in sides.items():
         if name not in skip:
@@ -18,9 +21,11 @@ def box(mesh, lo, hi, material, skip=""):
 
 def room(mesh, lo, hi, material, skip="", floor=None):
     """A box seen from inside."""
+
     class Inside:
         def face(self, corners, material):
             mesh.face(corners[::-1], material)
+
     inside = Inside()
     if floor:
         box(inside, lo, hi, floor, "x-x+y-y+z+")
@@ -42,9 +47,11 @@ def prism(mesh, outline, z0, z1, material, caps=True, lid=None):
 def turned(mesh, profile, sides, material, centre=(0, 0, 0)):
     """A lathe: profile [(radius, z)] going upward. Radius 0 closes it."""
     cx, cy, cz = centre
+
     def ring(r, z, k):
         t = 2 * math.pi * k / sides
         return (cx + r * math.cos(t), cy + r * math.sin(t), cz + z)
+
     for (r0, z0), (r1, z1) in zip(profile, profile[1:]):
         for k in range(sides):
             corners = [ring(r0, z0, k), ring(r0, z0, k + 1), ring(r1, z1, k + 1), ring(r1, z1, k)]
@@ -56,8 +63,13 @@ def turned(mesh, profile, sides, material, centre=(0, 0, 0)):
 
 
 def ball_profile(radius, steps, squash=1.0):
-    return [(abs(radius * math.sin(math.pi * i / steps)) if 0 < i < steps else 0,
-             -squash * radius * math.cos(math.pi * i / steps)) for i in range(steps + 1)]
+    return [
+        (
+            abs(radius * math.sin(math.pi * i / steps)) if 0 < i < steps else 0,
+            -squash * radius * math.cos(math.pi * i / steps),
+        )
+        for i in range(steps + 1)
+    ]
 
 
 def sub(a, b):
@@ -87,8 +99,12 @@ def tube(mesh, path, radius, sides, material, closed=False, caps=True):
         dot = sum(s * a for s, a in zip(side, along))
         side = unit(tuple(s - dot * a for s, a in zip(side, along)))
         up = cross(along, side)
-        rings.append([tuple(path[i][c] + radius * (math.cos(t) * side[c] + math.sin(t) * up[c]) for c in range(3))
-                      for t in (2 * math.pi * k / sides for k in range(sides))])
+        rings.append(
+            [
+                tuple(path[i][c] + radius * (math.cos(t) * side[c] + math.sin(t) * up[c]) for c in range(3))
+                for t in (2 * math.pi * k / sides for k in range(sides))
+            ]
+        )
     spans = range(n if closed else n - 1)
     for i in spans:
         a, b = rings[i], rings[(i + 1) % n]
@@ -102,9 +118,13 @@ def tube(mesh, path, radius, sides, material, closed=False, caps=True):
 
 def arc(cx, cy, radius, start, stop, steps, squash=1.0):
     """Points of an arc in a plane; degrees."""
-    return [(cx + radius * math.cos(math.radians(start + (stop - start) * i / steps)),
-             cy + squash * radius * math.sin(math.radians(start + (stop - start) * i / steps)))
-            for i in range(steps + 1)]
+    return [
+        (
+            cx + radius * math.cos(math.radians(start + (stop - start) * i / steps)),
+            cy + squash * radius * math.sin(math.radians(start + (stop - start) * i / steps)),
+        )
+        for i in range(steps + 1)
+    ]
 
 
 def resample(points, step):
@@ -136,5 +156,7 @@ def rounded(points, rounds=2, closed=False):
 
 def hanging(a, b, sag, steps):
     """A cable between two points: a parabola that hangs `sag` below its chord."""
-    return [tuple(p + (q - p) * t for p, q in zip(a[:2], b[:2])) + (a[2] + (b[2] - a[2]) * t - 4 * sag * t * (1 - t),)
-            for t in (i / steps for i in range(steps + 1))]
+    return [
+        tuple(p + (q - p) * t for p, q in zip(a[:2], b[:2])) + (a[2] + (b[2] - a[2]) * t - 4 * sag * t * (1 - t),)
+        for t in (i / steps for i in range(steps + 1))
+    ]

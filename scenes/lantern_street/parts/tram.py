@@ -1,9 +1,9 @@
 """The tram, coming down the street. Its front is -Y; it is moved by the top layer."""
 
-from .shapes import ball_profile, box, prism, room, tube, turned
+from .shapes import ball_profile, box, prism, tube, turned
 from .usda import Layer, Mesh, light
 
-LONG, HALF = 920, 108           # length; half width
+LONG, HALF = 920, 108  # length; half width
 
 
 def outline(grow=0.0, nose=46):
@@ -44,8 +44,7 @@ def body(layer):
         tube(mesh, [(x, -330, 236), (x, 330, 236)], 1.6, 5, "Brass")
     for y in (-210, 210):
         for x in (-50, 50):
-            turned(mesh, [(0, -33), (33, -33), (36, -30), (36, 30), (0, 30)], 4, "Iron", (0, y, 34)) if x < 0 else None
-            wheel(mesh, x, y)
+            tube(mesh, [(x - 5, y, 34), (x + 5, y, 34)], 33, 16, "Iron")
     # bumper, steps, lifeguard, trolley pole
     box(mesh, (-70, -LONG / 2 - 16, 44), (70, -LONG / 2, 58), "Iron")
     box(mesh, (-84, -LONG / 2 - 8, 14), (84, -LONG / 2 + 4, 20), "Timber")
@@ -56,16 +55,18 @@ def body(layer):
     mesh.write(layer, "Body")
 
 
-def wheel(mesh, x, y):
-    tube(mesh, [(x - 5, y, 34), (x + 5, y, 34)], 33, 16, "Iron")
-
-
 def people(layer):
     mesh = Mesh()
     for x, y in ((-72, -270), (70, -182), (-66, -94), (74, 82), (-72, 170), (62, 258), (20, -390)):
         driver = y < -350
         base = 70 if driver else 110
-        turned(mesh, [(20, 0), (24, 30), (20, 52), (7, 62)], 8, "ClothDark" if x > 0 else "BluePaint", (x, y, base + (40 if driver else 0)))
+        turned(
+            mesh,
+            [(20, 0), (24, 30), (20, 52), (7, 62)],
+            8,
+            "ClothDark" if x > 0 else "BluePaint",
+            (x, y, base + (40 if driver else 0)),
+        )
         turned(mesh, ball_profile(11, 6, 1.2), 8, "Skin", (x, y, base + 74 + (40 if driver else 0)))
     mesh.write(layer, "Passengers")
 
@@ -79,16 +80,46 @@ def write(folder):
             light(layer, "RectLight", f"Ceiling_{k + 1}", (0, y, 256), None, 3100, width=46, height=112, intensity=13)
         front = -LONG / 2
         for name, x in (("Left", -58), ("Right", 58)):
-            light(layer, "DiskLight", f"Lens_{name}", (x, front - 9.6, 96), (90, 0, 180), 4200, radius=11.5, intensity=26)
-            light(layer, "SphereLight", f"Headlight_{name}", (x, front - 12, 96), (83, 0, 180), 4200, (24, 0.75), radius=4,
-                  intensity=11000, treatAsPoint=True)
+            light(
+                layer,
+                "DiskLight",
+                f"Lens_{name}",
+                (x, front - 9.6, 96),
+                (90, 0, 180),
+                4200,
+                radius=11.5,
+                intensity=26,
+            )
+            light(
+                layer,
+                "SphereLight",
+                f"Headlight_{name}",
+                (x, front - 12, 96),
+                (83, 0, 180),
+                4200,
+                (24, 0.75),
+                radius=4,
+                intensity=11000,
+                treatAsPoint=True,
+            )
         sign = Mesh()
-        sign.face([(-56, front - 2.4, 233), (56, front - 2.4, 233), (56, front - 2.4, 261), (-56, front - 2.4, 261)], "TramSignGlow",
-                  uv=[(0, 0), (1, 0), (1, 1), (0, 1)])
+        sign.face(
+            [(-56, front - 2.4, 233), (56, front - 2.4, 233), (56, front - 2.4, 261), (-56, front - 2.4, 261)],
+            "TramSignGlow",
+            uv=[(0, 0), (1, 0), (1, 1), (0, 1)],
+        )
         sign.write(layer, "LineSign", body=["float inputs:intensity = 3.5"], light=True)
         for x in (-88, 88):
-            light(layer, "DiskLight", f"Marker_{'L' if x < 0 else 'R'}", (x, front + 8, 246), (90, 0, 180), color=(1, 0.06, 0.02),
-                  radius=4, intensity=9)
+            light(
+                layer,
+                "DiskLight",
+                f"Marker_{'L' if x < 0 else 'R'}",
+                (x, front + 8, 246),
+                (90, 0, 180),
+                color=(1, 0.06, 0.02),
+                radius=4,
+                intensity=9,
+            )
         # Stand-ins that must not render.
         proxy = Mesh()
         box(proxy, (-HALF, -LONG / 2, 30), (HALF, LONG / 2, 312), "ClothRed")

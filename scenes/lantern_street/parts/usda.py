@@ -40,8 +40,16 @@ class Layer:
         return f"rel material:binding = <{self.here}/Materials/{material}>"
 
     def save(self, folder):
-        head = ["#usda 1.0", "(", f'    doc = """{self.doc}"""', f'    defaultPrim = "{self.roots[0]}"',
-                "    metersPerUnit = 0.01", '    upAxis = "Z"', ")", ""]
+        head = [
+            "#usda 1.0",
+            "(",
+            f'    doc = """{self.doc}"""',
+            f'    defaultPrim = "{self.roots[0]}"',
+            "    metersPerUnit = 0.01",
+            '    upAxis = "Z"',
+            ")",
+            "",
+        ]
         target = folder / self.path
         target.parent.mkdir(parents=True, exist_ok=True)
         target.write_text("\n".join(head + self.lines).rstrip() + "\n", encoding="utf-8", newline="\n")
@@ -88,8 +96,9 @@ class _Root(_Prim):
         if layer.used:
             with layer.prim("Scope", "Materials"):
                 for name in sorted(layer.used):
-                    layer.put(f'def Material "{name}" (prepend references = '
-                              f"@{layer.library}@</Materials/{name}>) {{}}")
+                    layer.put(
+                        f'def Material "{name}" (prepend references = ' f"@{layer.library}@</Materials/{name}>) {{}}"
+                    )
         super().__exit__(*exc)
 
 
@@ -153,8 +162,11 @@ class Mesh:
             if vertex_uv:
                 layer.put("texCoord2f[] primvars:st = " + array(vertex_uv, vec) + ' (interpolation = "vertex")')
             elif any(any(any(c) for c in uv) for uv in uvs):
-                layer.put("texCoord2f[] primvars:st = " + array((c for uv in uvs for c in uv), vec)
-                          + ' (interpolation = "faceVarying")')
+                layer.put(
+                    "texCoord2f[] primvars:st = "
+                    + array((c for uv in uvs for c in uv), vec)
+                    + ' (interpolation = "faceVarying")'
+                )
             if left_handed:
                 layer.put('uniform token orientation = "leftHanded"')
             layer.put('uniform token subdivisionScheme = "none"')
@@ -197,8 +209,10 @@ def light(layer, kind, name, translate=None, rotate=None, kelvin=None, cone=None
     if kelvin:
         body += ["bool inputs:enableColorTemperature = 1", f"float inputs:colorTemperature = {kelvin}"]
     if cone:
-        body += [f"float inputs:shaping:cone:angle = {num(cone[0])}",
-                 f"float inputs:shaping:cone:softness = {num(cone[1])}"]
+        body += [
+            f"float inputs:shaping:cone:angle = {num(cone[0])}",
+            f"float inputs:shaping:cone:softness = {num(cone[1])}",
+        ]
     for key, value in inputs.items():
         if key == "treatAsPoint":
             body.append(f"bool treatAsPoint = {int(value)}")
@@ -234,10 +248,12 @@ def smooth(x):
 
 def noise(x, y, seed=0):
     """Value noise in [0, 1]."""
+
     def corner(i, j):
         h = (i * 374761393 + j * 668265263 + seed * 974711) & 0xFFFFFFFF
         h = ((h ^ (h >> 13)) * 1274126177) & 0xFFFFFFFF
         return ((h ^ (h >> 16)) & 0xFFFFFF) / 0xFFFFFF
+
     i, j = math.floor(x), math.floor(y)
     a, b = smooth(x - i), smooth(y - j)
     low = corner(i, j) * (1 - a) + corner(i + 1, j) * a
