@@ -8,7 +8,7 @@
 
 from pathlib import Path
 
-from parts import houses, materials, neon, props, street, strings, textures, tram
+from parts import houses, materials, neon, props, street, strings, textures, tram, windows
 
 
 def main():
@@ -16,6 +16,7 @@ def main():
     textures.write_all(folder / "textures")
     materials.write(folder)
     street.write(folder)
+    windows.write(folder)
     houses.write(folder)
     lanterns, bulbs = strings.write(folder)
     triangles = neon.write(folder)

@@ -110,7 +110,10 @@ def write(folder):
         )
         color = ("setts_color.png", "rgb", [SRGB])
         material(
-            layer, "SettsWet", [], {"diffuseColor": color, "normal": bump, "roughness": ("setts_wet.png", "r", [RAW])}
+            layer,
+            "SettsWet",
+            [],
+            {"diffuseColor": color, "normal": bump, "roughness": ("setts_wet.png", "r", [RAW])},
         )
         material(layer, "SettsDry", ["float inputs:roughness = 0.85"], {"diffuseColor": color, "normal": bump})
         for name, color in GLOWS.items():

@@ -1,6 +1,6 @@
 """Neon: letters and outlines bent from glass tube, thousands of triangles that are all light."""
 
-from .houses import TO_STREET
+from .windows import TO_STREET
 from .shapes import box, resample, tube
 from .strokes import candelabra, letter, word
 from .usda import Layer, Mesh, light, place, vec

@@ -2,7 +2,7 @@
 
 import math
 
-from .houses import leaves
+from .windows import leaves
 from .shapes import arc, ball_profile, box, prism, tube, turned
 from .strings import instancer
 from .usda import Dice, Layer, Mesh, light, place

@@ -13,7 +13,9 @@ WATER = -1.55  # the level of the puddles
 def depth(x, y):
     """Height of the roadway: worn hollows along wheel tracks and gutters."""
     hollow = (
-        noise(x / 95 + 40, y / 210 + 3, 1) * 0.62 + noise(x / 38, y / 70, 2) * 0.25 + noise(x / 15, y / 22, 3) * 0.13
+        noise(x / 95 + 40, y / 210 + 3, 1) * 0.62
+        + noise(x / 38, y / 70, 2) * 0.25
+        + noise(x / 15, y / 22, 3) * 0.13
     )
     gutter = math.exp(-(((abs(x) - 345) / 45) ** 2))
     worn = math.exp(-(((x - 160) / 90) ** 2))

@@ -26,7 +26,14 @@ def lanterns(folder):
             fittings(mesh, -18, -18 - 2 * radius, radius * 0.5)
             mesh.write(layer, "Fittings")
             light(
-                layer, "SphereLight", "Paper", (0, 0, -18 - radius), None, color=color, radius=radius, intensity=nits
+                layer,
+                "SphereLight",
+                "Paper",
+                (0, 0, -18 - radius),
+                None,
+                color=color,
+                radius=radius,
+                intensity=nits,
             )
     for name, color, nits, squash in (
         ("RedPaper", (1, 0.055, 0.015), 5.5, 0.82),
@@ -133,7 +140,9 @@ def lantern_rows(layer):
 
 
 def bulbs(folder):
-    layer = Layer("assets/bulb.usda", "A festoon bulb: a glass that glows, and under it the point light that works.")
+    layer = Layer(
+        "assets/bulb.usda", "A festoon bulb: a glass that glows, and under it the point light that works."
+    )
     with layer.root("Bulb"):
         mesh = Mesh()
         turned(mesh, [(0, -10.5), (3.1, -7), (0, -3)], 4, "BulbGlass")
@@ -141,7 +150,9 @@ def bulbs(folder):
         mesh = Mesh()
         turned(mesh, [(1.2, -4), (1.2, 0.5)], 4, "Rubber")
         mesh.write(layer, "Socket")
-        light(layer, "SphereLight", "Filament", (0, 0, -12.5), None, 2400, radius=2, intensity=120, treatAsPoint=True)
+        light(
+            layer, "SphereLight", "Filament", (0, 0, -12.5), None, 2400, radius=2, intensity=120, treatAsPoint=True
+        )
     layer.save(folder)
 
 

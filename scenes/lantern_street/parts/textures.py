@@ -78,7 +78,9 @@ def setts(size=320, rows=12, columns=8, joint=0.055):
     edge = np.sqrt(dx * dx + dy * dy) / (0.24 / rows)
     dome = np.clip(1.05 - edge**2.2, 0, 1)
     mask = np.clip((dome - joint) * 4, 0, 1)
-    tilt = (stone - 0.5) * fx * 0.5 + (grain(rows, columns, 4)[row.astype(int), column.astype(int)] - 0.5) * fy * 0.5
+    tilt = (stone - 0.5) * fx * 0.5 + (
+        grain(rows, columns, 4)[row.astype(int), column.astype(int)] - 0.5
+    ) * fy * 0.5
     height = dome * (0.8 + 0.25 * stone + tilt) + 0.10 * clouds(size, size, 20, 8) * mask
     return height, stone, mask
 
@@ -144,7 +146,9 @@ def house_sign(width=256, height=112):
     base = paint(base, drawn([f + f[:1] for f in flames], width, height, 1, 3.0), (1.0, 0.80, 0.2))
     letters, wide = word("LUX TREE", 0, 0, 19)
     base = paint(
-        base, drawn([[(px + 18, py + 20) for px, py in s] for s in letters], width, height, 1, 2.3), (0.98, 0.9, 0.7)
+        base,
+        drawn([[(px + 18, py + 20) for px, py in s] for s in letters], width, height, 1, 2.3),
+        (0.98, 0.9, 0.7),
     )
     base[:5] = base[-5:] = 0
     base[:, :5] = base[:, -5:] = 0
@@ -224,7 +228,8 @@ def write_all(folder):
     save(folder / "setts_color.png", encode(tint * tone[..., None]))
     save(folder / "setts_normal.png", normals(height, 2.6))
     save(
-        folder / "setts_wet.png", np.clip(0.20 + 0.30 * clouds(*height.shape, 9, 30) * mask + 0.16 * (1 - mask), 0, 1)
+        folder / "setts_wet.png",
+        np.clip(0.20 + 0.30 * clouds(*height.shape, 9, 30) * mask + 0.16 * (1 - mask), 0, 1),
     )
     save(folder / "plaster.png", encode(plaster()))
     height, stone, mask = setts(192, 24, 8, 0.2)

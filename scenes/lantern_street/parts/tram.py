@@ -77,7 +77,9 @@ def write(folder):
         body(layer)
         people(layer)
         for k, y in enumerate(range(-370, 400, 148)):
-            light(layer, "RectLight", f"Ceiling_{k + 1}", (0, y, 256), None, 3100, width=46, height=112, intensity=13)
+            light(
+                layer, "RectLight", f"Ceiling_{k + 1}", (0, y, 256), None, 3100, width=46, height=112, intensity=13
+            )
         front = -LONG / 2
         for name, x in (("Left", -58), ("Right", 58)):
             light(

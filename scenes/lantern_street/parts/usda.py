@@ -97,7 +97,8 @@ class _Root(_Prim):
             with layer.prim("Scope", "Materials"):
                 for name in sorted(layer.used):
                     layer.put(
-                        f'def Material "{name}" (prepend references = ' f"@{layer.library}@</Materials/{name}>) {{}}"
+                        f'def Material "{name}" (prepend references = '
+                        f"@{layer.library}@</Materials/{name}>) {{}}"
                     )
         super().__exit__(*exc)
 
