@@ -28,7 +28,7 @@ SIZES = {
 _FALLBACKS = {
     "intensity": 1.0, "exposure": 0.0, "color": Gf.Vec3f(1), "normalize": False,
     "enableColorTemperature": False, "colorTemperature": 6500.0, "width": 1.0, "height": 1.0,
-    "length": 1.0, "radius": 0.5, "angle": 0.53, "treatAsPoint": False, "diffuse": 1.0, "specular": 1.0,
+    "length": 1.0, "radius": 0.5, "angle": 0.53, "diffuse": 1.0, "specular": 1.0,
 }  # fmt: skip
 
 
@@ -83,7 +83,8 @@ def read_light(prim: Usd.Prim, kind: str, frames: Frames, report: Report) -> Lig
         normalize=bool(reader.at_first("normalize")),
         size={name: reader.size(name) for name in SIZES.get(kind, ())},
         shaping=reader.shaping(kind),
-        treat_as_point=kind == "SphereLight" and bool(reader.at_first("treatAsPoint")),
+        # The schema names this one without `inputs:`.
+        treat_as_point=kind == "SphereLight" and bool(prim.GetAttribute("treatAsPoint").Get(frames.first)),
         force=bool(prim.GetAttribute("candelabra:force").Get(frames.first) or False),
         material_sync=str(prim.GetAttribute("light:materialSyncMode").Get() or "noMaterialResponse"),
         inputs=_verbatim(prim, frames),

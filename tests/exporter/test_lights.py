@@ -131,7 +131,7 @@ def test_a_light_is_black_and_only_emits(gltf):
 def test_treat_as_point_is_candela(gltf):
     scene = gltf(
         CM_Z_UP + """def SphereLight "L" {
-            bool inputs:treatAsPoint = 1
+            bool treatAsPoint = 1
             float inputs:radius = 20
             float inputs:intensity = 1000
         }"""
@@ -145,7 +145,7 @@ def test_treat_as_point_is_candela(gltf):
 @pytest.mark.parametrize(("unit", "factor"), [("stage", 1e-4), ("metre", 1.0)])
 def test_a_normalized_point_has_a_quarter_of_its_intensity_whatever_its_radius(gltf, radius, unit, factor):
     scene = gltf(
-        CM_Z_UP + f'def SphereLight "L" {{ bool inputs:treatAsPoint = 1\n float inputs:radius = {radius}\n'
+        CM_Z_UP + f'def SphereLight "L" {{ bool treatAsPoint = 1\n float inputs:radius = {radius}\n'
         " float inputs:intensity = 8\n bool inputs:normalize = 1 }",
         "--normalize-area",
         unit,
@@ -171,7 +171,7 @@ def test_a_normalized_flat_light_without_size_keeps_its_cosine(gltf):
 def test_a_shaped_point_is_a_spot_with_its_usd_shaping(gltf):
     scene = gltf(
         """def SphereLight "L" (prepend apiSchemas = ["ShapingAPI"]) {
-            bool inputs:treatAsPoint = 1
+            bool treatAsPoint = 1
             float inputs:shaping:cone:angle = 40
             float inputs:shaping:cone:softness = 0.25
             float inputs:shaping:focus = 2
