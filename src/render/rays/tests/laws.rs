@@ -236,3 +236,37 @@ fn a_flat_scaled_moving_mesh_is_a_flat_mesh() {
         assert_eq!(tracer.closest(origin, -Vec3::Z, 9.0, &ALL).is_some(), expected);
     }
 }
+
+#[test]
+fn a_light_sample_is_not_hidden_by_its_own_triangle() {
+    for scale in [1e-6_f32, 1.0, 1e6] {
+        for moving in [false, true] {
+            let mut numbers = Numbers(18);
+            let triangles = soup(&mut numbers, 1, scale);
+            let at = parts(
+                DVec3::new(3.0, -2.0, 5.0) * f64::from(scale),
+                DQuat::from_rotation_x(0.4),
+                DVec3::new(1.0, 2.0, 0.5),
+            );
+            let mut scene = scene(vec![mesh(&triangles)], &[(0, at)]);
+            if moving {
+                scene.nodes[0] = turning(scene.nodes[0].clone());
+            }
+            let pose = scene.pose_at(0.3);
+            let prepared = RayScene::new(&scene, &pose);
+            let tracer = prepared.for_pose(&scene, &pose);
+            // As an integrator finds it: corners transformed and interpolated in f32.
+            let [a, b, c] = triangles[0].map(|p| pose.world(0).transform_point3(p));
+            let normal = (b - a).cross(c - a).normalize();
+            let magnitude = a.abs().max(b.abs()).max(c.abs()).max_element();
+            for _ in 0..2000 {
+                let uv = warp::triangle(Vec2::new(numbers.next(), numbers.next()));
+                let point = a * (1.0 - uv.x - uv.y) + b * uv.x + c * uv.y;
+                let light = Anchor::computed(point, normal, magnitude);
+                let eye = Anchor::free(point + (numbers.point() * 8.0 - 4.0) * scale);
+                assert!(!tracer.occluded_between(&eye, &light, &ALL), "{eye:?} {light:?}");
+                assert!(!tracer.occluded_between(&light, &eye, &ALL));
+            }
+        }
+    }
+}
