@@ -1,7 +1,7 @@
 //! A set of triangles that a ray can search: the lower level of the kernel.
 
 use super::triangles::{Block, Ray, ShearedRay, plane_distance};
-use super::wide_bvh::{BoxRay, NONE, WIDTH, WideBvh, bounds_of};
+use super::wide_bvh::{BoxRay, LEAF_SIZE, NONE, WideBvh, bounds_of};
 use glam::{DVec3, Vec3};
 use obvhs::aabb::Aabb;
 use rayon::prelude::*;
@@ -23,7 +23,7 @@ pub struct TriangleId {
 pub struct Blas {
     tree: WideBvh,
     blocks: Vec<Block>,
-    ids: Vec<[TriangleId; WIDTH]>,
+    ids: Vec<[TriangleId; LEAF_SIZE]>,
     bounds: Option<(Vec3, Vec3)>,
 }
 
@@ -48,9 +48,9 @@ impl Blas {
             .collect();
         let boxes: Vec<Aabb> =
             kept.par_iter().map(|&i| bounds_of(&triangles[i as usize])).collect();
-        let (tree, leaves) = WideBvh::build(&boxes, WIDTH as u32);
+        let (tree, leaves) = WideBvh::build(&boxes, LEAF_SIZE as u32);
         let filled = leaves.par_iter().map(|leaf| {
-            let (mut block, mut names) = (Block::EMPTY, [TriangleId::default(); WIDTH]);
+            let (mut block, mut names) = (Block::EMPTY, [TriangleId::default(); LEAF_SIZE]);
             for (lane, &entry) in leaf.iter().enumerate().filter(|&(_, &entry)| entry != NONE) {
                 let triangle = kept[entry as usize] as usize;
                 block.set(lane, triangles[triangle]);
@@ -112,13 +112,13 @@ impl Blas {
         let box_ray = BoxRay::new(origin, direction);
         let sheared = ShearedRay::<KZ>::new(origin, direction);
         let mut best = tmax;
-        let mut bound = round_up(tmax);
+        let mut bound = search_limit(tmax);
         let mut found = None;
         self.tree.walk::<CLOSEST>(&box_ray, bound, |leaf| {
             let block = &self.blocks[leaf as usize];
             let mut lanes = block.candidates(&sheared, bound);
             while lanes != 0 {
-                let lane = lanes.trailing_zeros() as usize % WIDTH;
+                let lane = lanes.trailing_zeros() as usize % LEAF_SIZE;
                 lanes &= lanes - 1;
                 let corners = block.get(lane);
                 let Some(t) = plane_distance(ray, corners) else { continue };
@@ -134,7 +134,7 @@ impl Blas {
                     return -1.0;
                 }
                 best = t;
-                bound = round_up(t);
+                bound = search_limit(t);
             }
             bound
         });
@@ -142,9 +142,10 @@ impl Blas {
     }
 }
 
-/// Not below `t`, in single precision.
-fn round_up(t: f64) -> f32 {
-    (t as f32).next_up()
+/// A single-precision bound that what lies before `t` is searched with: larger than `t` by more
+/// than the search rounds, since what it finds is measured again.
+pub fn search_limit(t: f64) -> f32 {
+    t as f32 * 1.000_002
 }
 
 fn can_be_hit(&[a, b, c]: &[Vec3; 3]) -> bool {

@@ -8,7 +8,7 @@
 //! What callers may rely on:
 //!
 //! - The hit nearest to the origin at a distance in the open interval `(0, tmax)`, found
-//!   watertight (see [`triangles`]) and measured in double precision. There is no scene epsilon.
+//!   watertight (Woop 2013) and measured in double precision. There is no scene epsilon.
 //!   Coordinates from 1e-9 to 1e9 metres are tested; beyond 1e12 they are filtered.
 //! - A ray that starts at [`Anchor::origin_toward`] does not meet the surface it left.
 //! - Triangles are two-sided; the normal is the front's, which counts the corners

@@ -1,6 +1,6 @@
 //! One frame of the ray kernel.
 
-use super::blas::{Blas, BlasHit, LARGEST_COORDINATE, TriangleId};
+use super::blas::{Blas, BlasHit, LARGEST_COORDINATE, TriangleId, search_limit};
 use super::sphere::Sphere;
 use super::triangles::{Ray, barycentric};
 use super::wide_bvh::{BoxRay, NONE, WideBvh};
@@ -140,7 +140,7 @@ impl<'a> Tracer<'a> {
             found = Some(Found::Triangle(Nearest { hit, to_world: None }));
         }
         let box_ray = BoxRay::new(origin, direction);
-        self.tree.walk::<true>(&box_ray, (best as f32).next_up(), |item| {
+        self.tree.walk::<true>(&box_ray, search_limit(best), |item| {
             let nearer = match &self.items[item as usize] {
                 Item::Sphere(sphere) => {
                     sphere.distance(&ray, best).map(|t| (t, Found::Sphere(t, *sphere)))
@@ -162,7 +162,7 @@ impl<'a> Tracer<'a> {
                 best = t;
                 found = Some(nearer);
             }
-            (best as f32).next_up()
+            search_limit(best)
         });
         found.map(|found| match found {
             Found::Triangle(nearest) => self.triangle_hit(&ray, nearest),
@@ -207,7 +207,7 @@ impl<'a> Tracer<'a> {
             return true;
         }
         let mut blocked = false;
-        let bound = (tmax as f32).next_up();
+        let bound = search_limit(tmax);
         let box_ray = BoxRay::new(ray.origin.as_vec3(), ray.direction.as_vec3());
         self.tree.walk::<false>(&box_ray, bound, |item| {
             blocked = match &self.items[item as usize] {
