@@ -35,7 +35,7 @@ pub struct TreeRow {
 pub struct FrameRow {
     /// The frame's number.
     pub frame: i32,
-    /// Row of its tree; [`NO_TREE`] if nothing shines.
+    /// Row of its tree; `u32::MAX` if nothing shines.
     pub tree: u32,
 }
 
