@@ -3,7 +3,7 @@
 //! `cargo bench --bench light_tree`
 
 use candelabra::bounds::{Aabb, Cone, LightBounds};
-use candelabra::light_tree::{LeafContent, LightSummary, LightTree, LightTreeWriter, Receiver};
+use candelabra::light_tree::{LightSummary, LightTree, LightTreeWriter, Link, Receiver};
 use candelabra::math::random::{hash, widen};
 use candelabra::pipeline::open_tree;
 use candelabra::store::AlignedBytes;
@@ -43,7 +43,7 @@ fn triangles(count: u32) -> Vec<LightBounds> {
 
 fn build(bounds: &[LightBounds]) -> AlignedBytes {
     let mut writer = LightTreeWriter::default();
-    writer.add_tree(bounds, |i| LeafContent::Emitter(i as u32));
+    writer.add_tree(bounds, |i| Link::Emitter(i as u32));
     writer.add_light(&LightSummary {
         path: "/mesh".into(),
         fingerprint: [0; 32],
