@@ -18,31 +18,6 @@ use std::mem;
 
 type Prepared = Result<(), Box<dyn Error>>;
 
-/// Members that refer to other objects: one, a list, or by name.
-const REFERENCES: [&str; 21] = [
-    "attributes",
-    "buffer",
-    "bufferView",
-    "camera",
-    "children",
-    "index",
-    "indices",
-    "input",
-    "inverseBindMatrices",
-    "joints",
-    "light",
-    "material",
-    "mesh",
-    "node",
-    "nodes",
-    "output",
-    "sampler",
-    "skeleton",
-    "skin",
-    "source",
-    "targets",
-];
-
 /// What was taken out, by the number of the object.
 #[derive(Default)]
 pub(in crate::ingest::gltf) struct Beside {
@@ -169,9 +144,7 @@ pub(super) fn scene(row: &mut Row) -> Prepared {
 pub(super) fn mesh(row: &mut Row) -> Prepared {
     for primitive in rows(row, "primitives") {
         known("primitive mode", primitive.get("mode"), VALID_MODES)?;
-        let targets: Vec<Row> = primitive
-            .get_mut("targets")
-            .map_or(Ok(Vec::new()), |targets| from_value(targets.clone()))?;
+        let targets = primitive.get("targets").map_or(Ok(Vec::new()), Vec::<Row>::deserialize)?;
         if let Some(attributes) = primitive.get_mut("attributes").and_then(Value::as_object_mut) {
             for (name, index) in mem::take(attributes) {
                 let semantic: Checked<Semantic> = from_value(json!(name))?;
@@ -185,30 +158,6 @@ pub(super) fn mesh(row: &mut Row) -> Prepared {
         }
     }
     Ok(())
-}
-
-/// The crate cuts references to 32 bits.
-pub(super) fn indices(row: &Row) -> Prepared {
-    row.iter().try_for_each(|(key, value)| indices_in(key, value))
-}
-
-fn indices_in(key: &str, value: &Value) -> Prepared {
-    let is_reference = REFERENCES.contains(&key);
-    match value {
-        Value::Number(index) if is_reference && u32::deserialize(index).is_err() => {
-            Err(format!("invalid value {index} of {key}, expected the number of an object").into())
-        }
-        Value::Array(values) => values.iter().try_for_each(|value| indices_in(key, value)),
-        Value::Object(values) if ["attributes", "targets"].contains(&key) => {
-            values.values().try_for_each(|value| indices_in(key, value))
-        }
-        Value::Object(values) if key == "extensions" => values
-            .iter()
-            .filter(|(name, _)| name.starts_with("KHR_") || name.starts_with("EXT_"))
-            .try_for_each(|(name, value)| indices_in(name, value)),
-        Value::Object(values) if key != "extras" => indices(values),
-        _ => Ok(()),
-    }
 }
 
 /// The crate forgets what it does not know, and cuts numbers to 32 bits before it looks.

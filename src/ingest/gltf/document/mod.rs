@@ -6,6 +6,7 @@
 mod beside;
 mod extras;
 mod real;
+mod reference;
 
 pub(super) use beside::{Beside, Channel, Instancing, Target, Transform};
 pub(super) use extras::{AssetUsd, UsdCamera, UsdLux, usd_path};
@@ -162,9 +163,8 @@ fn table<T: DeserializeOwned>(
         let Some(row) = value.as_object_mut() else {
             return Err(Fault::new(object, "is not an object"));
         };
-        beside::indices(row)
-            .and_then(|()| prepare(row))
-            .map_err(|problem| Fault::new(&object, problem))?;
+        reference::check(row).map_err(|problem| Fault::new(&object, problem))?;
+        prepare(row).map_err(|problem| Fault::new(&object, problem))?;
         typed(value, &object)
     };
     rows.into_iter().enumerate().map(row).collect()
