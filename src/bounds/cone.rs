@@ -56,6 +56,29 @@ impl Cone {
         Cone { axis, theta_o, theta_e, two_sided }
     }
 
+    /// A cone around some: their unions one after the other, or the cone about the mean of their
+    /// axes, whichever is narrower.
+    ///
+    /// # Panics
+    /// If there are none.
+    pub fn around(cones: &[Cone]) -> Cone {
+        let unions = cones[1..].iter().fold(cones[0], |all, cone| all.union(cone));
+        if unions.theta_o == 0.0 {
+            return unions;
+        }
+        let turned = |cone: &Cone| {
+            let flip = unions.two_sided && cone.axis.dot(unions.axis) < 0.0;
+            if flip { -cone.axis } else { cone.axis }
+        };
+        let sum: Vec3 = cones.iter().map(turned).sum();
+        let Some(mean) = sum.try_normalize() else { return unions };
+        let reach = cones
+            .iter()
+            .map(|cone| angle::between(mean, turned(cone)) + cone.theta_o)
+            .fold(0.0, f32::max);
+        if reach < unions.theta_o { Cone { axis: mean, theta_o: reach, ..unions } } else { unions }
+    }
+
     /// How much of the sphere the cone lights, weighted by the cosine beyond `theta_o`: the seed's
     /// `M_omega` in closed form. `pi` for a flat face, `4 pi` for all directions.
     pub fn measure(&self) -> f32 {
@@ -113,6 +136,12 @@ mod tests {
             prop_assert!(union.axis.is_normalized());
             prop_assert!(contains(&union, &a) && contains(&union, &b), "{union:?}");
             prop_assert!(union.theta_e >= a.theta_e.max(b.theta_e));
+        }
+
+        #[test]
+        fn a_cone_around_some_contains_each(cones in prop::collection::vec(any_cone(), 1..9)) {
+            let around = Cone::around(&cones);
+            prop_assert!(cones.iter().all(|cone| contains(&around, cone)), "{around:?}");
         }
 
         #[test]

@@ -26,12 +26,16 @@ pub struct LightBounds {
 }
 
 impl LightBounds {
-    /// The bounds of both together.
-    pub fn union(&self, other: &LightBounds) -> LightBounds {
+    /// The bounds of some together.
+    ///
+    /// # Panics
+    /// If there are none.
+    pub fn around(parts: &[LightBounds]) -> LightBounds {
+        let cones: Vec<Cone> = parts.iter().map(|part| part.cone).collect();
         LightBounds {
-            aabb: self.aabb.union(&other.aabb),
-            cone: self.cone.union(&other.cone),
-            energy: (f64::from(self.energy) + f64::from(other.energy)) as f32,
+            aabb: parts.iter().fold(Aabb::EMPTY, |all, part| all.union(&part.aabb)),
+            cone: Cone::around(&cones),
+            energy: parts.iter().map(|part| f64::from(part.energy)).sum::<f64>() as f32,
         }
     }
 

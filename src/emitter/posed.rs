@@ -36,8 +36,12 @@ pub struct LightOverflow {
 pub struct LightSample {
     /// Unit, from the receiver.
     pub direction: Vec3,
-    /// Metres.
-    pub distance: f32,
+    /// Where on the light, world space, metres.
+    pub point: Vec3,
+    /// Normal of the light's surface there, unit; zero for a point or a spot.
+    pub normal: Vec3,
+    /// The largest coordinate that `point` was computed from, metres: bounds its rounding.
+    pub magnitude_m: f32,
     /// Radiance, nits; from a point or a spot the irradiance of a facing surface, lux.
     pub radiance: Rgb,
     /// Density over solid angle, 1/sr; `None` for a point or a spot, which no ray can hit.
@@ -152,14 +156,15 @@ impl<'a> PosedEmitters<'a> {
                 let triangle = self.triangle(instance, number);
                 let found = triangle.sample(receiver, u)?;
                 let barycentric = found.barycentric;
-                let to_light = triangle.at(barycentric) - receiver;
-                let distance = to_light.length();
-                let direction = to_light / distance;
+                let point = triangle.at(barycentric);
+                let direction = (point - receiver).try_normalize()?;
                 let radiance =
                     self.triangle_radiance(emitter, instance, &triangle, barycentric, direction);
                 (radiance != Rgb::ZERO).then_some(LightSample {
                     direction,
-                    distance,
+                    point,
+                    normal: triangle.area_normal().normalize_or_zero(),
+                    magnitude_m: triangle.magnitude_m(),
                     radiance,
                     pdf: Some(found.pdf),
                     on_mesh: Some(MeshPlace { instance: row, triangle: number, barycentric }),
@@ -177,16 +182,20 @@ impl<'a> PosedEmitters<'a> {
         };
         let sample = match &light.kind {
             LightKind::Point { intensity_cd } => {
-                self.from_point(light, receiver, *intensity_cd, &None)?
+                self.sample_point(light, receiver, *intensity_cd, &None)?
             }
             LightKind::Spot { intensity_cd, shaping } => {
-                self.from_point(light, receiver, *intensity_cd, &Some(*shaping))?
+                self.sample_point(light, receiver, *intensity_cd, &Some(*shaping))?
             }
             LightKind::Sphere { radiance_nits, shaping, .. } => {
-                let found = self.sphere(light).sample(receiver, u)?;
+                let sphere = self.sphere(light);
+                let found = sphere.sample(receiver, u)?;
+                let point = receiver + found.direction * found.distance;
                 LightSample {
                     direction: found.direction,
-                    distance: found.distance,
+                    point,
+                    normal: (point - sphere.center).normalize_or_zero(),
+                    magnitude_m: receiver.abs().max(point.abs()).max_element(),
                     radiance: *radiance_nits * shaped(shaping, found.direction),
                     pdf: Some(found.pdf),
                     on_mesh: None,
@@ -198,14 +207,15 @@ impl<'a> PosedEmitters<'a> {
     }
 
     /// `I / d^2`, with the profile and with glTF's window where the light has a range.
-    fn from_point(
+    fn sample_point(
         &self,
         light: &Light,
         receiver: Vec3,
         intensity_cd: Rgb,
         shaping: &Option<Shaping>,
     ) -> Option<LightSample> {
-        let to_light = Vec3::from(self.pose.world(light.node).translation) - receiver;
+        let point = Vec3::from(self.pose.world(light.node).translation);
+        let to_light = point - receiver;
         let d2 = to_light.length_squared();
         let distance = d2.sqrt();
         if d2 == 0.0 {
@@ -216,7 +226,15 @@ impl<'a> PosedEmitters<'a> {
             shaping.map_or(Rgb::ONE, |s| s.factor((-direction).dot(self.aim(light.node))));
         let window = light.range_m.map_or(1.0, |range| (1.0 - (distance / range).powi(4)).max(0.0));
         let radiance = intensity_cd * profile * (window / d2);
-        Some(LightSample { direction, distance, radiance, pdf: None, on_mesh: None })
+        Some(LightSample {
+            direction,
+            point,
+            normal: Vec3::ZERO,
+            magnitude_m: 0.0,
+            radiance,
+            pdf: None,
+            on_mesh: None,
+        })
     }
 
     /// Radiance that a ray sees where it has hit an emitter, nits. `direction` is the ray's, unit.

@@ -16,8 +16,8 @@ pub fn mean_over_triangle(texture: &Texture, usage: &TextureUse, uvs: [Vec2; 3])
     let min = (corners[0].min(corners[1]).min(corners[2]) - 1.0).ceil();
     let max = (corners[0].max(corners[1]).max(corners[2]) + 1.0).floor();
     let spans = max - min + 1.0;
-    // Written so that coordinates which are not numbers take the first branch too.
-    if !(spans.x * spans.y <= MOST_TEXELS) {
+    let covered = spans.x * spans.y;
+    if covered.is_nan() || covered > MOST_TEXELS {
         return mean_of(texture, texels(DVec2::ZERO, size - 1.0));
     }
     mean_of(texture, texels(min, max).filter(|&texel| touches(&corners, texel)))

@@ -40,6 +40,11 @@ impl WorldTriangle {
         0.5 * self.area_normal().length()
     }
 
+    /// The largest coordinate of a corner, metres.
+    pub fn magnitude_m(&self) -> f32 {
+        self.corners.iter().map(|corner| corner.abs().max_element()).fold(0.0, f32::max)
+    }
+
     /// The point with some barycentric coordinates.
     pub fn at(&self, barycentric: Vec2) -> Vec3 {
         let [a, b, c] = self.corners;

@@ -13,6 +13,7 @@
 //! empty list, an undeclared extension that is not read) passes. And it is not an exporter's
 //! counterpart only: `extras` that `scripts/usd_to_gltf.py` writes (see `carriers.md`) are read,
 //! but any glTF with emissive materials or punctual lights is as good.
+#![doc = include_str!("carriers.md")]
 
 mod budget;
 mod error;

@@ -8,7 +8,11 @@
 //!   receiver is inside, and in units of length squared, so that the scale of the scene cancels.
 //! - Importance 0 is a proof of darkness, so it is granted only beyond a [slack](SLACK) that covers
 //!   all rounding; whatever else is small stays above a [floor](FLOOR).
+//!
+//! The formula is written once, for one lane, without a branch, so that the compiler computes the
+//! eight lanes of a group together.
 
+use super::group::{Group, WIDTH};
 use super::node::Node;
 use glam::Vec3;
 
@@ -30,75 +34,104 @@ const FLOOR: f32 = 1e-4;
 /// The share of the sphere's squared radius that softens the squared distance.
 const SOFTENING: f32 = 0.1;
 
+/// What the formula needs of a cluster, decoded. Components apart, as lanes have them.
+pub(super) struct Cluster {
+    pub center: [f32; 3],
+    pub half_extent: [f32; 3],
+    /// Not of unit length.
+    pub axis: [f32; 3],
+    pub cos_theta_o: f32,
+    pub cos_theta_e: f32,
+    pub two_sided: bool,
+}
+
+/// The product of both cosine factors, and the squared distance, m^2. Importance is energy times
+/// the first over the second.
+#[inline(always)]
+pub(super) fn factors(cluster: &Cluster, receiver: &Receiver) -> (f32, f32) {
+    let [px, py, pz] = receiver.point.to_array();
+    let [nx, ny, nz] = receiver.normal.to_array();
+    let [cx, cy, cz] = cluster.center;
+    let [hx, hy, hz] = cluster.half_extent;
+    let [ax, ay, az] = cluster.axis;
+    // From the cluster to the receiver.
+    let (vx, vy, vz) = (px - cx, py - cy, pz - cz);
+    let d2 = vx * vx + vy * vy + vz * vz;
+    let r2 = hx * hx + hy * hy + hz * hz;
+    let distance2 = d2 + SOFTENING * r2;
+
+    // Provably below the receiver's horizon: the whole box is.
+    let below = nx * vx + ny * vy + nz * vz;
+    let reach = nx.abs() * hx + ny.abs() * hy + nz.abs() * hz;
+    let d = d2.sqrt();
+    let is_below = below - reach > SLACK * (d + reach);
+
+    // The half angle of the sphere; inside it every direction is possible.
+    let inside = d2 <= r2;
+    let inverse_d = 1.0 / if inside { 1.0 } else { d };
+    let sin_u = if inside { 1.0 } else { r2.sqrt() * inverse_d };
+    let cos_u = (1.0 - sin_u * sin_u).max(0.0).sqrt();
+
+    // Emission: 1 inside the cone, falling to its edge, 0 beyond. The sine of theta_o + theta_u is
+    // negative where the sum is beyond pi.
+    let inverse_axis = 1.0 / (ax * ax + ay * ay + az * az).sqrt();
+    let along = (ax * vx + ay * vy + az * vz) * inverse_d * inverse_axis;
+    let along = if cluster.two_sided { along.abs() } else { along };
+    let cosine = along.clamp(-1.0, 1.0);
+    let sine = (1.0 - cosine * cosine).sqrt();
+    let cos_o = cluster.cos_theta_o;
+    let sin_o = (1.0 - cos_o * cos_o).max(0.0).sqrt();
+    let sin_sum = sin_o * cos_u + cos_o * sin_u;
+    let cos_sum = cos_o * cos_u - sin_o * sin_u;
+    let within = inside | (sin_sum < 0.0) | (cosine >= cos_sum);
+    let off = cosine * cos_sum + sine * sin_sum;
+    let is_dark = !within & (off < cluster.cos_theta_e - SLACK);
+    let emission = if within { 1.0 } else { off.max(FLOOR) };
+
+    // Reception: the largest cosine that any point of the sphere can have. Without a normal every
+    // direction counts alike.
+    let in_medium = (nx == 0.0) & (ny == 0.0) & (nz == 0.0);
+    let cosine_i = (-below * inverse_d).clamp(-1.0, 1.0);
+    let sine_i = (1.0 - cosine_i * cosine_i).sqrt();
+    let best = if cosine_i >= cos_u { 1.0 } else { cosine_i * cos_u + sine_i * sin_u };
+    let reception = if inside | in_medium { 1.0 } else { best.max(FLOOR) };
+
+    let product = emission * reception;
+    (if is_below | is_dark { 0.0 } else { product }, distance2)
+}
+
+/// Energy times cosines over squared distance, in double precision: energies and distances may
+/// span more than `f32` does.
+#[inline(always)]
+fn importance(energy: f32, product: f32, distance2: f32) -> f64 {
+    /// Below every distance that `f32` squares, above nothing at all.
+    const LEAST: f64 = 1e-60;
+    f64::from(energy) * f64::from(product) / (f64::from(distance2) + LEAST)
+}
+
 impl Node {
-    /// Importance of this cluster to a receiver, W/m^2 in the scene's units; 0 only where none of
-    /// its light can arrive.
-    #[inline]
+    /// Importance of this cluster to a receiver: an estimate of the irradiance from it, in the
+    /// scene's units; 0 only where none of its light can arrive.
     pub fn importance(&self, receiver: &Receiver) -> f64 {
-        let to_receiver = receiver.point - self.center();
-        let half = self.half_extent();
-        let (d2, r2) = (to_receiver.length_squared(), half.length_squared());
-        let d = d2.sqrt();
-
-        let horizon = receiver.normal.dot(to_receiver);
-        let reach = receiver.normal.abs().dot(half);
-        if horizon - reach > SLACK * (d + reach) {
-            return 0.0;
-        }
-
-        let distance2 = f64::from(d2 + SOFTENING * r2).max(f64::MIN_POSITIVE.sqrt());
-        let unshaded = f64::from(self.energy()) / distance2;
-        if d2 <= r2 {
-            return unshaded;
-        }
-        let sin2_u = r2 / d2;
-        let seen = Seen { sin_u: sin2_u.sqrt(), cos_u: (1.0 - sin2_u).sqrt() };
-
-        let emission = self.emission_cosine(to_receiver, d, &seen);
-        if emission == 0.0 {
-            return 0.0;
-        }
-        let reception = if receiver.normal == Vec3::ZERO {
-            1.0
-        } else {
-            seen.largest_cosine((-horizon / d).clamp(-1.0, 1.0)).max(FLOOR)
-        };
-        unshaded * f64::from(emission * reception)
-    }
-
-    /// Upper bound on the emission's cosine: 1 inside the cone, falling to its edge, 0 beyond.
-    #[inline]
-    fn emission_cosine(&self, to_receiver: Vec3, d: f32, seen: &Seen) -> f32 {
-        let axis = self.axis_unnormalised();
-        let cosine = axis.dot(to_receiver) / (d * axis.length());
-        let cosine = if self.is_two_sided() { cosine.abs() } else { cosine }.clamp(-1.0, 1.0);
-        let cos_o = self.cos_theta_o();
-        let sin_o = (1.0 - cos_o * cos_o).max(0.0).sqrt();
-        // theta_o + theta_u; its sine is negative beyond pi.
-        let sin_sum = sin_o * seen.cos_u + cos_o * seen.sin_u;
-        let cos_sum = cos_o * seen.cos_u - sin_o * seen.sin_u;
-        if sin_sum < 0.0 || cosine >= cos_sum {
-            return 1.0;
-        }
-        let sine = (1.0 - cosine * cosine).max(0.0).sqrt();
-        let cos_off = cosine * cos_sum + sine * sin_sum;
-        if cos_off < self.cos_theta_e() - SLACK { 0.0 } else { cos_off.max(FLOOR) }
+        let (product, distance2) = factors(&self.cluster(), receiver);
+        importance(self.energy(), product, distance2)
     }
 }
 
-/// Under which half angle the receiver sees the bounding sphere; below pi/2.
-struct Seen {
-    sin_u: f32,
-    cos_u: f32,
-}
-
-impl Seen {
-    /// `cos(max(0, theta - theta_u))` from `cos(theta)`.
+impl Group {
+    /// The importance of each lane; 0 for a lane that is not used.
     #[inline]
-    fn largest_cosine(&self, cosine: f32) -> f32 {
-        if cosine >= self.cos_u {
-            return 1.0;
+    pub fn importances(&self, receiver: &Receiver) -> [f64; WIDTH] {
+        let mut products = [0.0; WIDTH];
+        let mut distances2 = [0.0; WIDTH];
+        let lanes = self.decode();
+        for lane in 0..WIDTH {
+            (products[lane], distances2[lane]) = factors(&lanes.cluster(lane), receiver);
         }
-        cosine * self.cos_u + (1.0 - cosine * cosine).max(0.0).sqrt() * self.sin_u
+        let mut weights = [0.0; WIDTH];
+        for lane in 0..WIDTH {
+            weights[lane] = importance(self.energy(lane), products[lane], distances2[lane]);
+        }
+        weights
     }
 }

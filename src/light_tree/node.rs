@@ -4,39 +4,66 @@
 //! a kilometre light fit one scene. Everything that decides "no light from here" is rounded to the
 //! safe side: boxes and cones only ever grow. The layout is in the [format](crate::store).
 
+use super::importance::Cluster;
 use crate::bounds::{Aabb, Cone, LightBounds};
 use crate::math::angle::between;
 use bytemuck::{Pod, Zeroable};
 use glam::{DVec3, Vec2, Vec3};
 
-/// One emitter or one cluster. Siblings lie side by side: a step down touches one cache line.
+/// One emitter or one cluster, on its own; a [group](super::group::Group) holds eight.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
 pub struct Node {
-    center: [f32; 3],
-    energy: f32,
-    half_extent: [u8; 3],
-    half_exponent: u8,
-    axis: [i16; 2],
-    theta_o: u16,
-    theta_e: u8,
-    reserved: u8,
-    link: u32,
+    pub(super) center: [f32; 3],
+    pub(super) energy: f32,
+    pub(super) half_extent: [u8; 3],
+    pub(super) half_exponent: u8,
+    pub(super) axis: [i16; 2],
+    pub(super) theta_o: u16,
+    pub(super) theta_e: u8,
+    pub(super) reserved: u8,
+    pub(super) link: u32,
 }
-
-/// Two siblings in one cache line.
-pub type Pair = [Node; 2];
 
 /// Where a node leads.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Link {
-    /// The pair that holds its children.
+    /// Nowhere: the lane is not used.
+    Nothing,
+    /// To the group that holds its children, so many groups further on.
     Inner(u32),
-    /// The number of its leaf.
-    Leaf(u32),
+    /// It is an emitter, by number.
+    Emitter(u32),
+    /// It stands for a whole tree, by row.
+    Tree(u32),
 }
 
 const LEAF_BIT: u32 = 1 << 31;
+const TREE_BIT: u32 = 1 << 30;
+/// Emitters, trees and groups are numbered below this.
+pub(super) const MOST: usize = 1 << 30;
+
+impl Link {
+    #[inline]
+    pub(super) fn decode(code: u32) -> Link {
+        match (code & LEAF_BIT, code & TREE_BIT) {
+            (0, _) if code == 0 => Link::Nothing,
+            (0, _) => Link::Inner(code),
+            (_, 0) => Link::Emitter(code & !LEAF_BIT),
+            _ => Link::Tree(code & !(LEAF_BIT | TREE_BIT)),
+        }
+    }
+
+    fn encode(self) -> u32 {
+        match self {
+            Link::Nothing => 0,
+            Link::Inner(ahead) => ahead,
+            Link::Emitter(emitter) => emitter | LEAF_BIT,
+            Link::Tree(row) => row | LEAF_BIT | TREE_BIT,
+        }
+    }
+}
+
 const TWO_SIDED_BIT: u16 = 1 << 15;
 const AXIS_STEPS: f32 = 32767.0;
 /// `1 - cos theta_o` in `[0, 2]` takes fifteen bits.
@@ -53,7 +80,7 @@ impl Node {
         let center = bounds.aabb.center();
         let (half_extent, half_exponent) = encode_half_extent(&bounds.aabb, center);
         let axis = encode_axis(bounds.cone.axis);
-        let tilt = between(decode_axis(axis).normalize(), bounds.cone.axis);
+        let tilt = between(Vec3::from_array(decode_axis(axis)).normalize(), bounds.cone.axis);
         // `between` of equal vectors is exactly 0, so an axis that survives costs no widening.
         let theta_o = (one_minus_cos(bounds.cone.theta_o + tilt) * THETA_O_STEPS).ceil();
         let theta_e = (one_minus_cos(bounds.cone.theta_e).sqrt() * THETA_E_STEPS).ceil();
@@ -67,10 +94,7 @@ impl Node {
             theta_o: theta_o.min(32767.0) as u16 | two_sided,
             theta_e: theta_e.min(255.0) as u8,
             reserved: 0,
-            link: match link {
-                Link::Inner(pair) => pair,
-                Link::Leaf(leaf) => leaf | LEAF_BIT,
-            },
+            link: link.encode(),
         }
     }
 
@@ -83,10 +107,10 @@ impl Node {
         LightBounds {
             aabb: Aabb { min: round_down(center - half), max: -round_down(-center - half) },
             cone: Cone {
-                axis: decode_axis(self.axis).normalize(),
+                axis: Vec3::from_array(decode_axis(self.axis)).normalize(),
                 theta_o: angle(theta_o) as f32,
                 theta_e: angle(theta_e) as f32,
-                two_sided: self.is_two_sided(),
+                two_sided: is_two_sided(self.theta_o),
             },
             energy: self.energy,
         }
@@ -95,11 +119,7 @@ impl Node {
     /// Where it leads.
     #[inline]
     pub fn link(&self) -> Link {
-        if self.link & LEAF_BIT == 0 {
-            Link::Inner(self.link)
-        } else {
-            Link::Leaf(self.link & !LEAF_BIT)
-        }
+        Link::decode(self.link)
     }
 
     /// Middle of the box, world space, metres.
@@ -111,8 +131,7 @@ impl Node {
     /// Half the edges of the box, metres.
     #[inline]
     pub fn half_extent(&self) -> Vec3 {
-        let scale = f32::from_bits(u32::from(self.half_exponent) << 23);
-        Vec3::from_array(self.half_extent.map(f32::from)) * scale
+        Vec3::from_array(self.half_extent.map(f32::from)) * scale(self.half_exponent)
     }
 
     /// Peak radiant intensity, summed over the cluster.
@@ -121,26 +140,16 @@ impl Node {
         self.energy
     }
 
-    /// Cone axis, not of unit length.
-    #[inline]
-    pub(super) fn axis_unnormalised(&self) -> Vec3 {
-        decode_axis(self.axis)
-    }
-
-    #[inline]
-    pub(super) fn cos_theta_o(&self) -> f32 {
-        1.0 - f32::from(self.theta_o & !TWO_SIDED_BIT) * (1.0 / THETA_O_STEPS as f32)
-    }
-
-    #[inline]
-    pub(super) fn cos_theta_e(&self) -> f32 {
-        let root = f32::from(self.theta_e) * (1.0 / THETA_E_STEPS as f32);
-        1.0 - root * root
-    }
-
-    #[inline]
-    pub(super) fn is_two_sided(&self) -> bool {
-        self.theta_o & TWO_SIDED_BIT != 0
+    /// Decoded for the importance.
+    pub(super) fn cluster(&self) -> Cluster {
+        Cluster {
+            center: self.center,
+            half_extent: self.half_extent().to_array(),
+            axis: decode_axis(self.axis),
+            cos_theta_o: decode_cos_theta_o(self.theta_o),
+            cos_theta_e: decode_cos_theta_e(self.theta_e),
+            two_sided: is_two_sided(self.theta_o),
+        }
     }
 
     /// What a node must be whatever its neighbours: the first rule it breaks.
@@ -156,6 +165,41 @@ impl Node {
         } else {
             None
         }
+    }
+}
+
+/// Angles may differ by the rounding of their own computation.
+const ANGLE_TOLERANCE: f64 = 5e-6;
+
+impl Node {
+    /// What of a child sticks out of this node, if anything does.
+    pub(super) fn uncontained(&self, child: &Node) -> Option<&'static str> {
+        let apart = (self.center().as_dvec3() - child.center().as_dvec3()).abs();
+        let reach = apart + child.half_extent().as_dvec3();
+        if reach.cmpgt(self.half_extent().as_dvec3()).any() {
+            return Some("a child's box is not inside its parent's");
+        }
+        if child.theta_e > self.theta_e
+            || (is_two_sided(child.theta_o) && !is_two_sided(self.theta_o))
+        {
+            return Some("a child shines where its parent does not");
+        }
+        let code = |node: &Node| node.theta_o & !TWO_SIDED_BIT;
+        let everywhere = code(self) == !TWO_SIDED_BIT;
+        if everywhere || (self.axis == child.axis && code(child) <= code(self)) {
+            return None;
+        }
+        // cos(theta_d + theta_c) >= cos(theta_p + tolerance), and the sum is not beyond pi.
+        let unit = |node: &Node| Vec3::from_array(decode_axis(node.axis)).as_dvec3().normalize();
+        let cos_of = |node: &Node| 1.0 - f64::from(code(node)) / THETA_O_STEPS;
+        let dot = unit(self).dot(unit(child));
+        let cos_d = if is_two_sided(self.theta_o) { dot.abs() } else { dot }.clamp(-1.0, 1.0);
+        let (cos_c, cos_p) = (cos_of(child), cos_of(self));
+        let sin = |cos: f64| (1.0 - cos * cos).max(0.0).sqrt();
+        let cos_needed = cos_d * cos_c - sin(cos_d) * sin(cos_c);
+        let least = cos_p - ANGLE_TOLERANCE * (sin(cos_p) + ANGLE_TOLERANCE);
+        let beyond = cos_d < -cos_c;
+        (beyond || cos_needed < least).then_some("a child's cone is not inside its parent's")
     }
 }
 
@@ -194,12 +238,34 @@ fn encode_axis(axis: Vec3) -> [i16; 2] {
 }
 
 /// The direction of an octahedral code, not of unit length.
-#[inline]
-fn decode_axis(code: [i16; 2]) -> Vec3 {
-    let flat = Vec2::from_array(code.map(f32::from)) * (1.0 / AXIS_STEPS);
-    let z = 1.0 - flat.x.abs() - flat.y.abs();
+#[inline(always)]
+pub(super) fn decode_axis(code: [i16; 2]) -> [f32; 3] {
+    let [x, y] = code.map(|step| f32::from(step) * (1.0 / AXIS_STEPS));
+    let z = 1.0 - x.abs() - y.abs();
     let fold = (-z).max(0.0);
-    (flat - fold * sign(flat)).extend(z)
+    [x - fold.copysign(x), y - fold.copysign(y), z]
+}
+
+/// What the mantissas of a half extent are multiplied by.
+#[inline(always)]
+pub(super) fn scale(half_exponent: u8) -> f32 {
+    f32::from_bits(u32::from(half_exponent) << 23)
+}
+
+#[inline(always)]
+pub(super) fn decode_cos_theta_o(code: u16) -> f32 {
+    1.0 - f32::from(code & !TWO_SIDED_BIT) * (1.0 / THETA_O_STEPS as f32)
+}
+
+#[inline(always)]
+pub(super) fn decode_cos_theta_e(code: u8) -> f32 {
+    let root = f32::from(code) * (1.0 / THETA_E_STEPS as f32);
+    1.0 - root * root
+}
+
+#[inline(always)]
+pub(super) fn is_two_sided(code: u16) -> bool {
+    code & TWO_SIDED_BIT != 0
 }
 
 /// +1 or -1, also of zero.
@@ -243,7 +309,7 @@ mod tests {
     proptest! {
         #[test]
         fn a_node_contains_what_it_encodes(bounds in any_bounds()) {
-            let decoded = Node::encode(&bounds, Link::Leaf(3)).bounds();
+            let decoded = Node::encode(&bounds, Link::Emitter(3)).bounds();
             prop_assert!(decoded.aabb.contains_box(&bounds.aabb), "{decoded:?}");
             let tilt = between(decoded.cone.axis, bounds.cone.axis);
             let needed = (tilt + bounds.cone.theta_o).min(PI);
@@ -269,13 +335,21 @@ mod tests {
             cone: Cone::flat(Vec3::Y, true),
             energy: 2.0,
         };
-        assert_eq!(Node::encode(&bounds, Link::Leaf(0)).bounds(), bounds);
+        assert_eq!(Node::encode(&bounds, Link::Emitter(0)).bounds(), bounds);
         let all = LightBounds { cone: Cone::ALL, ..bounds };
-        assert_eq!(Node::encode(&all, Link::Leaf(0)).bounds().cone, Cone::ALL);
+        assert_eq!(Node::encode(&all, Link::Emitter(0)).bounds().cone, Cone::ALL);
     }
 
     #[test]
-    fn a_node_is_half_a_cache_line() {
-        assert_eq!((size_of::<Node>(), size_of::<Pair>()), (32, 64));
+    fn a_node_takes_32_bytes_alone_and_in_a_group() {
+        use crate::light_tree::group::{Group, WIDTH};
+        assert_eq!((size_of::<Node>(), size_of::<Group>()), (32, 32 * WIDTH));
+    }
+
+    #[test]
+    fn links_survive() {
+        for link in [Link::Nothing, Link::Inner(7), Link::Emitter(0), Link::Tree(0)] {
+            assert_eq!(Link::decode(link.encode()), link);
+        }
     }
 }

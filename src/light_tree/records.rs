@@ -6,27 +6,48 @@ use bytemuck::{Pod, Zeroable};
 
 pub const META: SectionId = SectionId(*b"META");
 pub const TREES: SectionId = SectionId(*b"TREE");
-pub const NODES: SectionId = SectionId(*b"NODE");
-pub const LEAVES: SectionId = SectionId(*b"LEAF");
+pub const GROUPS: SectionId = SectionId(*b"GRUP");
+pub const PARENTS: SectionId = SectionId(*b"PARE");
 pub const FRAMES: SectionId = SectionId(*b"FRAM");
 pub const LIGHTS: SectionId = SectionId(*b"LGHT");
 pub const PATHS: SectionId = SectionId(*b"PATH");
-pub const ALL: [SectionId; 7] = [META, TREES, NODES, LEAVES, FRAMES, LIGHTS, PATHS];
+pub const ALL: [SectionId; 7] = [META, TREES, GROUPS, PARENTS, FRAMES, LIGHTS, PATHS];
 
 /// One tree of a file.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
 pub struct TreeRow {
-    /// Its first pair; a tree of n leaves has n - 1.
-    pub first_pair: u32,
-    /// Its first leaf.
-    pub first_leaf: u32,
+    /// Its first group, the root's children.
+    pub first_group: u32,
+    /// How many groups it has, at least 1.
+    pub group_count: u32,
     /// How many leaves it has, at least 1.
     pub leaf_count: u32,
     /// Zero.
     pub reserved: u32,
-    /// Bounds of everything in it, and where it begins.
+    /// Bounds of everything in it. Its link is not used.
     pub root: Node,
+}
+
+/// The lane that leads to a group.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
+#[repr(transparent)]
+pub struct Parent(u32);
+
+impl Parent {
+    /// Of the first group of a tree.
+    pub const NONE: Parent = Parent(0);
+
+    /// Lane `lane` of the group so many groups `back`, at least 1.
+    pub fn new(back: u32, lane: usize) -> Parent {
+        Parent(back << 3 | lane as u32)
+    }
+
+    /// How many groups back, and which lane; `None` at the root.
+    #[inline]
+    pub fn get(self) -> Option<(u32, usize)> {
+        (self.0 != 0).then_some((self.0 >> 3, (self.0 & 7) as usize))
+    }
 }
 
 /// Which tree a frame samples.
@@ -35,7 +56,7 @@ pub struct TreeRow {
 pub struct FrameRow {
     /// The frame's number.
     pub frame: i32,
-    /// Row of its tree; [`NO_TREE`] if nothing shines.
+    /// Row of its tree; `u32::MAX` if nothing shines.
     pub tree: u32,
 }
 
@@ -62,36 +83,4 @@ pub struct LightRow {
     pub moves: u32,
     /// Zero.
     pub reserved: [u32; 2],
-}
-
-const TREE_BIT: u32 = 1 << 31;
-
-/// What a leaf stands for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum LeafContent {
-    /// An emitter, by number.
-    Emitter(u32),
-    /// A whole tree, by row.
-    Tree(u32),
-}
-
-impl LeafContent {
-    /// As the file has it.
-    #[inline]
-    pub fn encode(self) -> u32 {
-        match self {
-            LeafContent::Emitter(emitter) => emitter,
-            LeafContent::Tree(row) => row | TREE_BIT,
-        }
-    }
-
-    /// From the file.
-    #[inline]
-    pub fn decode(code: u32) -> LeafContent {
-        if code & TREE_BIT == 0 {
-            LeafContent::Emitter(code)
-        } else {
-            LeafContent::Tree(code & !TREE_BIT)
-        }
-    }
 }

@@ -1,12 +1,14 @@
 //! Picking one emitter for a receiver, and the probability of having picked it.
 //!
-//! From the root down, `P_L = I_L / (I_L + I_R)`, one random number stretched over all choices
-//! (seed, "Method overview"). [`FrameTree::sample`] and [`FrameTree::probability`] take the same
-//! choices by the same code, so they cannot disagree.
+//! From the root down, a child is chosen with the probability `I / sum of I` of its group, one
+//! random number stretched over all choices (seed, "Method overview"). [`FrameTree::sample`] walks
+//! down; [`FrameTree::probability`] walks up from the emitter's leaf, by the lane that leads to each
+//! group. Both weigh a group by the same code, and there is no limit to the depth.
 
+use super::group::{Group, WIDTH};
 use super::importance::Receiver;
-use super::node::{Link, Node, Pair};
-use super::records::{LeafContent, TreeRow};
+use super::node::{Link, Node};
+use super::records::{Parent, TreeRow};
 use super::tree::{LightTree, NoSuchFrame};
 
 /// One emitter, picked.
@@ -20,47 +22,52 @@ pub struct Pick {
     pub leftover: f64,
 }
 
-/// Where every emitter's leaf is: what [`FrameTree::probability`] needs to walk towards it.
-/// Made once for a shot by [`LightTree::leaf_table`].
+/// A lane of a group: the group's number times [`WIDTH`] plus the lane's.
+type Slot = u32;
+const NO_SLOT: Slot = u32::MAX;
+
+/// Where the leaf of every emitter that stands still is: what [`FrameTree::probability`] starts
+/// from. Made once for a shot by [`LightTree::leaf_table`].
 #[derive(Clone, Debug, Default)]
 pub struct LeafTable {
-    leaf_of: Vec<u32>,
+    slot_of: Vec<Slot>,
 }
-
-const NO_LEAF: u32 = u32::MAX;
 
 /// The tree of one frame, ready to be sampled.
 #[derive(Clone)]
 pub struct FrameTree<'a> {
-    pairs: &'a [Pair],
-    leaves: &'a [u32],
+    groups: &'a [Group],
+    parents: &'a [Parent],
     trees: &'a [TreeRow],
     root: Option<u32>,
-    /// The leaf of the frame's tree that stands for the tree of what stands still.
-    below: Option<(u32, u32)>,
+    /// The lane of the frame's tree that stands for the tree of what stands still.
+    below: Option<Slot>,
     static_leaves: &'a LeafTable,
-    moving_leaves: Vec<u32>,
+    moving_slots: Vec<Slot>,
 }
 
 impl<D: AsRef<[u8]>> LightTree<D> {
     /// Finds the leaves of all emitters that stand still.
     pub fn leaf_table(&self) -> LeafTable {
-        let mut leaf_of = vec![NO_LEAF; self.static_emitter_count().min(self.leaves().len())];
+        let most = self.groups().len() * WIDTH;
+        let mut slot_of = vec![NO_SLOT; self.static_emitter_count().min(most)];
         for tree in self.trees() {
-            self.note_leaves(tree, 0, &mut leaf_of);
-        }
-        LeafTable { leaf_of }
-    }
-
-    fn note_leaves(&self, tree: &TreeRow, first_emitter: usize, leaf_of: &mut [u32]) {
-        for (leaf, content) in self.contents(tree) {
-            if let LeafContent::Emitter(emitter) = content
-                && let Some(at) = (emitter as usize).checked_sub(first_emitter)
-                && let Some(entry) = leaf_of.get_mut(at)
-            {
-                *entry = leaf;
+            for (slot, link) in self.links(tree) {
+                if let Link::Emitter(emitter) = link
+                    && let Some(entry) = slot_of.get_mut(emitter as usize)
+                {
+                    *entry = slot;
+                }
             }
         }
+        LeafTable { slot_of }
+    }
+
+    /// Every used lane of a tree and where it leads.
+    fn links(&self, tree: &TreeRow) -> impl Iterator<Item = (Slot, Link)> + '_ {
+        let first = tree.first_group.wrapping_mul(WIDTH as u32);
+        let lanes = self.groups_of(tree).iter().flat_map(|g| (0..WIDTH).map(|lane| g.link(lane)));
+        lanes.enumerate().map(move |(i, link)| (first.wrapping_add(i as u32), link))
     }
 
     /// The tree of a frame.
@@ -72,34 +79,35 @@ impl<D: AsRef<[u8]>> LightTree<D> {
         frame: i32,
         static_leaves: &'a LeafTable,
     ) -> Result<FrameTree<'a>, NoSuchFrame> {
-        let root = self.tree_at(frame)?;
-        let row = root.and_then(|root| self.trees().get(root as usize));
-        let moving = self.emitter_count().saturating_sub(self.static_emitter_count());
-        let mut moving_leaves = vec![NO_LEAF; moving.min(self.leaves().len())];
+        let root = self.tree_at(frame)?.filter(|&row| (row as usize) < self.trees().len());
+        let fixed = self.static_emitter_count();
+        let moving = self.emitter_count().saturating_sub(fixed);
+        let mut moving_slots = vec![NO_SLOT; moving.min(self.groups().len() * WIDTH)];
         let mut below = None;
-        if let Some(row) = row {
-            self.note_leaves(row, self.static_emitter_count(), &mut moving_leaves);
-            below = self.contents(row).find_map(|(leaf, content)| match content {
-                LeafContent::Tree(tree) => Some((leaf, tree)),
-                LeafContent::Emitter(_) => None,
-            });
+        if let Some(row) = root {
+            for (slot, link) in self.links(&self.trees()[row as usize]) {
+                match link {
+                    Link::Tree(_) => below = Some(slot),
+                    Link::Emitter(emitter) => {
+                        let at = (emitter as usize).checked_sub(fixed);
+                        if let Some(entry) = at.and_then(|at| moving_slots.get_mut(at)) {
+                            *entry = slot;
+                        }
+                    }
+                    Link::Inner(_) | Link::Nothing => {}
+                }
+            }
         }
         Ok(FrameTree {
-            pairs: self.pairs(),
-            leaves: self.leaves(),
+            groups: self.groups(),
+            parents: self.parents(),
             trees: self.trees(),
-            root: row.and(root),
+            root,
             below,
             static_leaves,
-            moving_leaves,
+            moving_slots,
         })
     }
-}
-
-/// The two choices at a pair: the importances of both children.
-#[inline]
-fn importances(pair: &Pair, receiver: &Receiver) -> (f64, f64) {
-    (pair[0].importance(receiver), pair[1].importance(receiver))
 }
 
 /// The largest number below 1.
@@ -109,60 +117,28 @@ impl FrameTree<'_> {
     /// Picks an emitter with a random number in `[0, 1)`; `None` where nothing can arrive (which a
     /// descent may learn only below a cluster whose bounds were too wide to know).
     pub fn sample(&self, receiver: &Receiver, u: f64) -> Option<Pick> {
-        let (mut u, mut probability) = (u, 1.0);
-        // A leaf may stand for a tree, which comes earlier in the file: this ends.
         let mut row = self.root?;
-        loop {
-            let leaf = self.descend(row, receiver, &mut u, &mut probability)?;
-            match LeafContent::decode(*self.leaves.get(leaf as usize)?) {
-                LeafContent::Emitter(emitter) => {
-                    return Some(Pick { emitter, probability, leftover: u });
-                }
-                LeafContent::Tree(tree) if tree < row => row = tree,
-                LeafContent::Tree(_) => return None,
-            }
-        }
-    }
-
-    /// Walks from a tree's root to one of its leaves.
-    #[inline]
-    fn descend(
-        &self,
-        row: u32,
-        receiver: &Receiver,
-        u: &mut f64,
-        probability: &mut f64,
-    ) -> Option<u32> {
-        let root = &self.trees.get(row as usize)?.root;
-        if root.importance(receiver) == 0.0 {
+        let tree = &self.trees[row as usize];
+        if tree.root.importance(receiver) == 0.0 {
             return None;
         }
-        let mut link = root.link();
-        let mut last = None;
+        let (mut u, mut probability, mut at) = (u, 1.0, tree.first_group);
+        // Ends whatever the bytes: links lead onwards within a tree, and to earlier trees.
         loop {
-            let at = match link {
-                Link::Leaf(leaf) => return Some(leaf),
-                // Children come after their parents: damaged bytes cannot make a loop.
-                Link::Inner(pair) if Some(pair) > last => pair,
-                Link::Inner(_) => return None,
-            };
-            last = Some(at);
-            let pair = self.pairs.get(at as usize)?;
-            let (left, right) = importances(pair, receiver);
-            let total = left + right;
-            if !(total > 0.0 && total < f64::INFINITY) {
-                return None;
-            }
-            let p_left = left / total;
-            if *u < p_left {
-                *u = (*u / p_left).min(BELOW_ONE);
-                *probability *= p_left;
-                link = pair[0].link();
-            } else {
-                let p_right = right / total;
-                *u = ((*u - p_left) / p_right).clamp(0.0, BELOW_ONE);
-                *probability *= p_right;
-                link = pair[1].link();
+            let group = self.groups.get(at as usize)?;
+            let choice = choose(group, receiver, u)?;
+            u = choice.leftover;
+            probability *= choice.probability;
+            match group.link(choice.lane) {
+                Link::Emitter(emitter) => {
+                    return Some(Pick { emitter, probability, leftover: u });
+                }
+                Link::Inner(ahead) => at = at.checked_add(ahead)?,
+                Link::Tree(below) if below < row => {
+                    row = below;
+                    at = self.trees.get(row as usize)?.first_group;
+                }
+                Link::Tree(_) | Link::Nothing => return None,
             }
         }
     }
@@ -174,60 +150,49 @@ impl FrameTree<'_> {
     }
 
     fn try_probability(&self, receiver: &Receiver, emitter: u32) -> Option<f64> {
-        let root = self.root?;
-        let static_count = self.static_leaves.leaf_of.len();
-        let Some(moving) = (emitter as usize).checked_sub(static_count) else {
-            let leaf = *self.static_leaves.leaf_of.get(emitter as usize)?;
-            return match self.below {
-                Some((through, tree)) => Some(
-                    self.probability_of_leaf(root, receiver, through)?
-                        * self.probability_of_leaf(tree, receiver, leaf)?,
-                ),
-                None => self.probability_of_leaf(root, receiver, leaf),
-            };
-        };
-        self.probability_of_leaf(root, receiver, *self.moving_leaves.get(moving)?)
-    }
-
-    /// The product of the choices that lead to a leaf. Which side it is on follows from the
-    /// numbering alone; see the [format](crate::store).
-    fn probability_of_leaf(&self, row: u32, receiver: &Receiver, leaf: u32) -> Option<f64> {
-        let tree = self.trees.get(row as usize)?;
-        if tree.root.importance(receiver) == 0.0 {
+        if self.root()?.importance(receiver) == 0.0 {
             return None;
         }
+        let fixed = self.static_leaves.slot_of.len();
+        match (emitter as usize).checked_sub(fixed) {
+            Some(moving) => self.chance_of(*self.moving_slots.get(moving)?, receiver),
+            None => {
+                let above = match self.below {
+                    Some(slot) => self.chance_of(slot, receiver)?,
+                    None => 1.0,
+                };
+                Some(
+                    above
+                        * self.chance_of(self.static_leaves.slot_of[emitter as usize], receiver)?,
+                )
+            }
+        }
+    }
+
+    /// The product of the choices that lead from the root of its tree to a lane.
+    fn chance_of(&self, slot: Slot, receiver: &Receiver) -> Option<f64> {
+        let (mut at, mut lane) = (slot / WIDTH as u32, (slot % WIDTH as u32) as usize);
         let mut probability = 1.0;
-        let mut link = tree.root.link();
-        let mut first_leaf = tree.first_leaf;
-        let mut last = None;
         loop {
-            let at = match link {
-                Link::Leaf(found) => return (found == leaf).then_some(probability),
-                Link::Inner(pair) if Some(pair) > last => pair,
-                Link::Inner(_) => return None,
-            };
-            last = Some(at);
-            let pair = self.pairs.get(at as usize)?;
-            let (left, right) = importances(pair, receiver);
-            let total = left + right;
-            if !(total > 0.0 && total < f64::INFINITY) {
+            let weights = self.groups.get(at as usize)?.importances(receiver);
+            let total = sum(&weights);
+            if total <= 0.0 || !total.is_finite() {
                 return None;
             }
-            let middle = first_leaf_of_right(pair, at, first_leaf);
-            if leaf < middle {
-                probability *= left / total;
-                link = pair[0].link();
-            } else {
-                probability *= right / total;
-                link = pair[1].link();
-                first_leaf = middle;
+            probability *= weights[lane] / total;
+            match self.parents.get(at as usize)?.get() {
+                None => return Some(probability),
+                Some((back, parent_lane)) => {
+                    at = at.checked_sub(back.max(1))?;
+                    lane = parent_lane;
+                }
             }
         }
     }
 
     /// The node of everything; `None` if nothing shines.
     pub fn root(&self) -> Option<&Node> {
-        self.root.and_then(|row| self.trees.get(row as usize)).map(|tree| &tree.root)
+        self.root.map(|row| &self.trees[row as usize].root)
     }
 
     /// The importance of everything at a receiver; 0 if nothing shines.
@@ -238,31 +203,53 @@ impl FrameTree<'_> {
     /// Calls `visit` with every emitter and its leaf's node: what a perfect traversal would weigh.
     pub fn for_each_leaf(&self, mut visit: impl FnMut(u32, &Node)) {
         let mut next = self.root;
-        while let Some((row, tree)) =
-            next.and_then(|row| self.trees.get(row as usize).map(|tree| (row, tree)))
-        {
+        while let Some(row) = next {
             next = None;
-            let mut see = |node: &Node| {
-                let Link::Leaf(leaf) = node.link() else { return };
-                match self.leaves.get(leaf as usize).copied().map(LeafContent::decode) {
-                    Some(LeafContent::Emitter(emitter)) => visit(emitter, node),
-                    Some(LeafContent::Tree(below)) if below < row => next = Some(below),
+            let Some(tree) = self.trees.get(row as usize) else { return };
+            let rest = self.groups.get(tree.first_group as usize..).unwrap_or_default();
+            let groups = &rest[..rest.len().min(tree.group_count as usize)];
+            for node in groups.iter().flat_map(Group::nodes) {
+                match node.link() {
+                    Link::Emitter(emitter) => visit(emitter, &node),
+                    Link::Tree(below) if below < row => next = Some(below),
                     _ => {}
                 }
-            };
-            see(&tree.root);
-            let pairs = self.pairs.get(tree.first_pair as usize..).unwrap_or_default();
-            let count = (tree.leaf_count as usize).saturating_sub(1).min(pairs.len());
-            pairs[..count].iter().flatten().for_each(&mut see);
+            }
         }
     }
 }
 
-/// The number of the first leaf of a pair's right child.
+/// A child, chosen.
+struct Choice {
+    lane: usize,
+    probability: f64,
+    leftover: f64,
+}
+
+/// Chooses a child of a group by its share of the importance; `None` if all have none.
 #[inline]
-pub(super) fn first_leaf_of_right(pair: &Pair, at: u32, first_leaf: u32) -> u32 {
-    match pair[1].link() {
-        Link::Leaf(leaf) => leaf,
-        Link::Inner(right) => first_leaf.wrapping_add(right.wrapping_sub(at)),
+fn choose(group: &Group, receiver: &Receiver, u: f64) -> Option<Choice> {
+    let weights = group.importances(receiver);
+    let total = sum(&weights);
+    if total <= 0.0 || !total.is_finite() {
+        return None;
     }
+    let target = u * total;
+    let (mut lane, mut before, mut running) = (0, 0.0, 0.0);
+    for (i, weight) in weights.iter().enumerate() {
+        // The last lane with a weight whose stretch begins at or before the target.
+        let begins = *weight > 0.0 && running <= target;
+        lane = if begins { i } else { lane };
+        before = if begins { running } else { before };
+        running += weight;
+    }
+    let weight = weights[lane];
+    let leftover = ((target - before) / weight).clamp(0.0, BELOW_ONE);
+    Some(Choice { lane, probability: weight / total, leftover })
+}
+
+/// The sum of a group's weights, in the order in which they are walked through.
+#[inline]
+fn sum(weights: &[f64; WIDTH]) -> f64 {
+    weights.iter().sum()
 }

@@ -1,8 +1,9 @@
 //! A light tree file, opened: the same type over bytes just built and bytes just mapped.
 
-use super::node::Pair;
-use super::records::{self, FrameRow, LeafContent, LightRow, NO_TREE, TreeRow};
+use super::group::Group;
+use super::records::{self, FrameRow, LightRow, NO_TREE, Parent, TreeRow};
 use crate::store::{Container, Section, SectionId, StoreError};
+use bytemuck::Pod;
 use std::ops::Range;
 
 /// The light trees of a shot, viewed in the bytes of their file.
@@ -13,8 +14,8 @@ use std::ops::Range;
 pub struct LightTree<D> {
     container: Container<D>,
     trees: Range<usize>,
-    pairs: Range<usize>,
-    leaves: Range<usize>,
+    groups: Range<usize>,
+    parents: Range<usize>,
     frames: Option<Range<usize>>,
     lights: Range<usize>,
     paths: Range<usize>,
@@ -27,18 +28,19 @@ impl<D: AsRef<[u8]>> LightTree<D> {
     /// If the header or the section table is not sound; see [`StoreError`].
     pub fn open(data: D) -> Result<Self, StoreError> {
         let container = Container::open(data, &records::ALL)?;
-        let missing = |id: SectionId| move || StoreError::Missing(id);
+        fn required<T: Pod>(
+            container: &Container<impl AsRef<[u8]>>,
+            id: SectionId,
+        ) -> Result<Range<usize>, StoreError> {
+            container.find::<T>(id)?.ok_or(StoreError::Missing(id))
+        }
         Ok(LightTree {
-            trees: container
-                .find::<TreeRow>(records::TREES)?
-                .ok_or_else(missing(records::TREES))?,
-            pairs: container.find::<Pair>(records::NODES)?.ok_or_else(missing(records::NODES))?,
-            leaves: container.find::<u32>(records::LEAVES)?.ok_or_else(missing(records::LEAVES))?,
+            trees: required::<TreeRow>(&container, records::TREES)?,
+            groups: required::<Group>(&container, records::GROUPS)?,
+            parents: required::<Parent>(&container, records::PARENTS)?,
             frames: container.find::<FrameRow>(records::FRAMES)?,
-            lights: container
-                .find::<LightRow>(records::LIGHTS)?
-                .ok_or_else(missing(records::LIGHTS))?,
-            paths: container.find::<u8>(records::PATHS)?.ok_or_else(missing(records::PATHS))?,
+            lights: required::<LightRow>(&container, records::LIGHTS)?,
+            paths: required::<u8>(&container, records::PATHS)?,
             container,
         })
     }
@@ -53,14 +55,20 @@ impl<D: AsRef<[u8]>> LightTree<D> {
         self.container.view(&self.trees)
     }
 
-    /// Sibling nodes of all trees.
-    pub fn pairs(&self) -> &[Pair] {
-        self.container.view(&self.pairs)
+    /// The groups of all trees.
+    pub fn groups(&self) -> &[Group] {
+        self.container.view(&self.groups)
     }
 
-    /// What each leaf stands for, encoded; see [`LeafContent`].
-    pub fn leaves(&self) -> &[u32] {
-        self.container.view(&self.leaves)
+    /// For each group the lane that leads to it.
+    pub fn parents(&self) -> &[Parent] {
+        self.container.view(&self.parents)
+    }
+
+    /// The groups of one tree.
+    pub fn groups_of(&self, tree: &TreeRow) -> &[Group] {
+        let rest = self.groups().get(tree.first_group as usize..).unwrap_or_default();
+        &rest[..rest.len().min(tree.group_count as usize)]
     }
 
     /// The frames that have a tree of their own; empty if nothing moves.
@@ -131,14 +139,6 @@ impl<D: AsRef<[u8]>> LightTree<D> {
                 last: frames.last().map_or(0, |row| row.frame),
             }),
         }
-    }
-
-    /// What the leaves of a tree stand for, from left to right, with their numbers.
-    pub fn contents(&self, tree: &TreeRow) -> impl Iterator<Item = (u32, LeafContent)> + '_ {
-        let first = tree.first_leaf as usize;
-        let leaves = self.leaves().get(first..).unwrap_or_default();
-        let leaves = &leaves[..leaves.len().min(tree.leaf_count as usize)];
-        leaves.iter().zip(tree.first_leaf..).map(|(&code, leaf)| (leaf, LeafContent::decode(code)))
     }
 }
 

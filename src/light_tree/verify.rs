@@ -1,17 +1,15 @@
 //! Proof that a file is what the format says: that traversal ends, stays inside, and never calls
 //! a lit point dark.
 
-use super::node::{Link, Node};
-use super::records::{self, LeafContent, LightRow, NO_TREE, TreeRow};
-use super::sampling::first_leaf_of_right;
+use super::group::{Group, WIDTH};
+use super::node::{Link, MOST, Node};
+use super::records::{self, LightRow, NO_TREE, Parent, TreeRow};
 use super::tree::LightTree;
-use crate::math::angle;
 use crate::store::{SectionId, StoreError};
-use std::f32::consts::PI;
+use rayon::prelude::*;
+use std::sync::atomic::{AtomicU32, Ordering};
 
-/// Angles may differ by the rounding of their own computation.
-const ANGLE_TOLERANCE: f32 = 5e-6;
-/// Energies are sums of two `f32`.
+/// Energies are sums of a few `f32`.
 const ENERGY_TOLERANCE: f64 = 1e-6;
 
 type Checked<T = ()> = Result<T, StoreError>;
@@ -20,7 +18,7 @@ fn fail<T>(section: SectionId, rule: String) -> Checked<T> {
     Err(StoreError::Section { section, rule })
 }
 
-impl<D: AsRef<[u8]>> LightTree<D> {
+impl<D: AsRef<[u8]> + Sync> LightTree<D> {
     /// Checks everything the [format](crate::store) promises, in time linear in the file.
     ///
     /// # Errors
@@ -28,20 +26,23 @@ impl<D: AsRef<[u8]>> LightTree<D> {
     pub fn verify(&self) -> Result<(), StoreError> {
         self.verify_checksums()?;
         let static_emitters = self.verify_lights()?;
-        let mut seen = vec![false; self.emitter_count()];
-        let (mut pairs, mut leaves) = (0_u64, 0_u64);
+        if self.groups().len() >= MOST / WIDTH || self.parents().len() != self.groups().len() {
+            return fail(records::PARENTS, "there is not one for each group".into());
+        }
+        // In the tree of which row each emitter was last seen, plus one.
+        let seen: Vec<AtomicU32> = (0..self.emitter_count()).map(|_| AtomicU32::new(0)).collect();
+        let mut groups = 0_u64;
         for (row, tree) in self.trees().iter().enumerate() {
-            self.verify_row(row, tree, pairs, leaves)?;
-            pairs += u64::from(tree.leaf_count) - 1;
-            leaves += u64::from(tree.leaf_count);
-            self.verify_nodes(row, tree)?;
-            self.verify_leaves(row, tree, &mut seen)?;
+            self.verify_row(row, tree, groups)?;
+            groups += u64::from(tree.group_count);
+            self.verify_groups(row, tree, &seen)?;
         }
-        if pairs != self.pairs().len() as u64 || leaves != self.leaves().len() as u64 {
-            return fail(records::TREES, "the trees do not use all nodes and leaves".into());
+        if groups != self.groups().len() as u64 {
+            return fail(records::TREES, "the trees do not use all groups".into());
         }
-        if let Some(lost) = seen[..static_emitters].iter().position(|seen| !seen) {
-            return fail(records::LEAVES, format!("emitter {lost} is in no tree"));
+        let lost = seen[..static_emitters].iter().position(|row| row.load(Ordering::Relaxed) == 0);
+        if let Some(lost) = lost {
+            return fail(records::GROUPS, format!("emitter {lost} is in no tree"));
         }
         self.verify_frames()
     }
@@ -72,93 +73,56 @@ impl<D: AsRef<[u8]>> LightTree<D> {
             next_emitter += u64::from(light.emitter_count);
             before = Some(light);
         }
-        if next_emitter > self.leaves().len() as u64 {
+        if next_emitter > (self.groups().len() * WIDTH) as u64 {
             return fail(records::LIGHTS, "there are more emitters than leaves".into());
         }
         Ok(self.static_emitter_count())
     }
 
     /// A tree's row: in range, and following the tree before it.
-    fn verify_row(&self, row: usize, tree: &TreeRow, pairs: u64, leaves: u64) -> Checked {
-        let count = u64::from(tree.leaf_count);
-        let rule = if count == 0 || tree.reserved != 0 {
+    fn verify_row(&self, row: usize, tree: &TreeRow, groups: u64) -> Checked {
+        let rule = if tree.group_count == 0 || tree.leaf_count == 0 || tree.reserved != 0 {
             "a field has an impossible value"
-        } else if u64::from(tree.first_pair) != pairs || u64::from(tree.first_leaf) != leaves {
+        } else if u64::from(tree.first_group) != groups {
             "it does not follow the tree before it"
-        } else if pairs + count - 1 > self.pairs().len() as u64
-            || leaves + count > self.leaves().len() as u64
-        {
-            "it reaches beyond the nodes or leaves"
+        } else if groups + u64::from(tree.group_count) > self.groups().len() as u64 {
+            "it reaches beyond the groups"
+        } else if let Some(rule) = tree.root.broken_rule() {
+            rule
+        } else if tree.root.link() != Link::Nothing {
+            "its root leads somewhere"
         } else {
             return Ok(());
         };
         fail(records::TREES, format!("row {row}: {rule}"))
     }
 
-    /// All nodes of a tree: numbering, soundness, containment, energy.
-    fn verify_nodes(&self, row: usize, tree: &TreeRow) -> Checked {
-        if let Some(rule) = tree.root.broken_rule() {
-            return fail(records::TREES, format!("row {row}: its root: {rule}"));
-        }
-        let expected = place(tree.first_pair, tree.first_leaf, tree.leaf_count);
-        if tree.root.link() != expected {
-            return fail(records::TREES, format!("row {row}: its root leads elsewhere"));
-        }
-        // Clusters still to be checked: parent, first leaf, leaf count. Links were checked to be
-        // where preorder puts them before they are followed, so this visits every pair once.
-        let mut open = vec![(&tree.root, tree.first_leaf, tree.leaf_count)];
-        while let Some((parent, first_leaf, count)) = open.pop() {
-            let Link::Inner(at) = parent.link() else { continue };
-            let broken = |rule: &str| fail(records::NODES, format!("pair {at}: {rule}"));
-            let pair = &self.pairs()[at as usize];
-            let middle = first_leaf_of_right(pair, at, first_leaf);
-            let left_count = middle.wrapping_sub(first_leaf);
-            if left_count == 0 || left_count >= count {
-                return broken("the leaves are not divided");
-            }
-            let places = [
-                (place(at + 1, first_leaf, left_count), first_leaf, left_count),
-                (place(at + left_count, middle, count - left_count), middle, count - left_count),
-            ];
-            for (child, (expected, first, count)) in pair.iter().zip(places) {
-                if child.link() != expected {
-                    return broken("a child leads elsewhere");
-                }
-                if let Some(rule) = child.broken_rule() {
-                    return broken(rule);
-                }
-                if let Some(rule) = uncontained(parent, child) {
-                    return broken(rule);
-                }
-                open.push((child, first, count));
-            }
-            let sum = f64::from(pair[0].energy()) + f64::from(pair[1].energy());
-            if (sum - f64::from(parent.energy())).abs() > ENERGY_TOLERANCE * sum {
-                return broken("the energies do not add up to the parent's");
-            }
-        }
-        Ok(())
-    }
-
-    /// What the leaves stand for: each emitter once, and only trees that come earlier.
-    fn verify_leaves(&self, row: usize, tree: &TreeRow, seen: &mut [bool]) -> Checked {
-        let static_count = self.static_emitter_count();
-        // A moving emitter may be in the tree of each frame, but only once in each.
-        seen[static_count..].fill(false);
-        for (leaf, content) in self.contents(tree) {
-            let rule = match content {
-                LeafContent::Tree(below) if below as usize >= row => "it stands for a later tree",
-                LeafContent::Tree(_) => continue,
-                LeafContent::Emitter(emitter) => match seen.get_mut(emitter as usize) {
-                    None => "there is no such emitter",
-                    Some(true) => "its emitter has another leaf too",
-                    Some(once) => {
-                        *once = true;
-                        continue;
-                    }
-                },
+    /// All groups of a tree: each has one lane that leads to it, from an earlier group of the same
+    /// tree, and is contained in it. Then the walk down reaches every group, once, and ends.
+    fn verify_groups(&self, row: usize, tree: &TreeRow, seen: &[AtomicU32]) -> Checked {
+        let groups = self.groups_of(tree);
+        let parents = &self.parents()[tree.first_group as usize..][..groups.len()];
+        let check = |own: usize| {
+            let rule = match parent_of(groups, parents, own, &tree.root) {
+                Ok(parent) => check_group(&groups[own], &parent)
+                    .and_then(|()| check_links(&groups[own], row, tree, seen)),
+                Err(rule) => Err(rule),
             };
-            return fail(records::LEAVES, format!("leaf {leaf}: {rule}"));
+            let number = tree.first_group as usize + own;
+            rule.or_else(|rule| fail(records::GROUPS, format!("group {number}: {rule}")))
+        };
+        (0..groups.len()).into_par_iter().try_for_each(check)?;
+        let count = |wanted: fn(Link) -> bool| {
+            let lanes = |g: &Group| (0..WIDTH).filter(|&lane| wanted(g.link(lane))).count();
+            groups.par_iter().map(lanes).sum::<usize>()
+        };
+        if count(|link| matches!(link, Link::Inner(_))) != groups.len() - 1 {
+            return fail(records::GROUPS, format!("tree {row}: lanes and groups do not match"));
+        }
+        if count(|link| matches!(link, Link::Emitter(_) | Link::Tree(_)))
+            != tree.leaf_count as usize
+        {
+            return fail(records::TREES, format!("row {row}: it has another number of leaves"));
         }
         Ok(())
     }
@@ -176,27 +140,70 @@ impl<D: AsRef<[u8]>> LightTree<D> {
     }
 }
 
-/// Where preorder puts a cluster.
-fn place(first_pair: u32, first_leaf: u32, count: u32) -> Link {
-    if count == 1 { Link::Leaf(first_leaf) } else { Link::Inner(first_pair) }
+/// The node whose children a group holds; the lane must lead back to the group.
+fn parent_of(
+    groups: &[Group],
+    parents: &[Parent],
+    own: usize,
+    root: &Node,
+) -> Result<Node, &'static str> {
+    match (own, parents[own].get()) {
+        (0, None) => Ok(*root),
+        (0, Some(_)) => Err("the first group of a tree has a parent"),
+        (_, None) => Err("it has no parent"),
+        (_, Some((back, lane))) => {
+            let above = own.checked_sub(back as usize).filter(|&above| above < own);
+            let node = above.and_then(|above| groups[above].node(lane));
+            let node = node.filter(|node| node.link() == Link::Inner(back));
+            node.ok_or("its parent does not lead to it")
+        }
+    }
 }
 
-/// What of a child sticks out of its parent.
-fn uncontained(parent: &Node, child: &Node) -> Option<&'static str> {
-    let apart = (parent.center().as_dvec3() - child.center().as_dvec3()).abs();
-    let reach = apart + child.half_extent().as_dvec3();
-    if reach.cmpgt(parent.half_extent().as_dvec3()).any() {
-        return Some("a child's box is not inside its parent's");
+/// Soundness, containment and energy of a group's nodes.
+fn check_group(group: &Group, parent: &Node) -> Result<(), &'static str> {
+    if group.has_dirty_lane() {
+        return Err("a lane that is not used is not zero");
     }
-    let (outer, inner) = (parent.bounds().cone, child.bounds().cone);
-    if inner.theta_e > outer.theta_e + ANGLE_TOLERANCE || (inner.two_sided && !outer.two_sided) {
-        return Some("a child shines where its parent does not");
+    let mut sum = 0.0;
+    for child in group.nodes() {
+        if let Some(rule) = child.broken_rule() {
+            return Err(rule);
+        }
+        if let Some(rule) = parent.uncontained(&child) {
+            return Err(rule);
+        }
+        sum += f64::from(child.energy());
     }
-    let axis =
-        if outer.two_sided && outer.axis.dot(inner.axis) < 0.0 { -inner.axis } else { inner.axis };
-    let needed = angle::between(outer.axis, axis) + inner.theta_o;
-    if outer.theta_o < PI - ANGLE_TOLERANCE && needed > outer.theta_o + ANGLE_TOLERANCE {
-        return Some("a child's cone is not inside its parent's");
+    if (sum - f64::from(parent.energy())).abs() > ENERGY_TOLERANCE * sum || sum == 0.0 {
+        return Err("the energies do not add up to the parent's");
     }
-    None
+    Ok(())
+}
+
+/// What a group's leaves stand for: each emitter once in a tree, and only trees that come earlier.
+fn check_links(
+    group: &Group,
+    row: usize,
+    tree: &TreeRow,
+    seen: &[AtomicU32],
+) -> Result<(), &'static str> {
+    let mark = row as u32 + 1;
+    for lane in 0..WIDTH {
+        match group.link(lane) {
+            Link::Nothing => {}
+            Link::Inner(ahead) if ahead < tree.group_count => {}
+            Link::Inner(_) => return Err("a lane leads out of its tree"),
+            Link::Tree(below) if (below as usize) < row => {}
+            Link::Tree(_) => return Err("a lane stands for a later tree"),
+            Link::Emitter(emitter) => match seen.get(emitter as usize) {
+                None => return Err("there is no such emitter"),
+                Some(last) if last.swap(mark, Ordering::Relaxed) == mark => {
+                    return Err("an emitter has two leaves in one tree");
+                }
+                Some(_) => {}
+            },
+        }
+    }
+    Ok(())
 }

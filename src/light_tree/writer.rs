@@ -1,8 +1,8 @@
 //! Gathers the trees of a shot and lays them out as a file.
 
-use super::build::build_tree;
-use super::node::Pair;
-use super::records::{self, FrameRow, LeafContent, LightRow, NO_TREE, TreeRow};
+use super::build::{Groups, build_tree};
+use super::node::{Link, Node};
+use super::records::{self, FrameRow, LightRow, NO_TREE, TreeRow};
 use crate::bounds::LightBounds;
 use crate::store::{AlignedBytes, ContainerWriter};
 
@@ -25,8 +25,7 @@ pub struct LightSummary {
 #[derive(Default)]
 pub struct LightTreeWriter {
     trees: Vec<TreeRow>,
-    pairs: Vec<Pair>,
-    leaves: Vec<u32>,
+    groups: Groups,
     frames: Vec<FrameRow>,
     lights: Vec<LightRow>,
     paths: Vec<u8>,
@@ -34,23 +33,21 @@ pub struct LightTreeWriter {
 }
 
 impl LightTreeWriter {
-    /// Builds a tree over some bounds and returns its row; `stands_for` tells what each of them is.
-    /// No bounds give no tree.
+    /// Builds a tree over some bounds and returns its row; `stands_for` tells what each of them is:
+    /// an emitter or a tree added earlier. No bounds give no tree.
     pub fn add_tree(
         &mut self,
         bounds: &[LightBounds],
-        stands_for: impl Fn(usize) -> LeafContent,
+        stands_for: impl Fn(usize) -> Link + Sync,
     ) -> Option<u32> {
-        let (first_leaf, first_pair) = (self.leaves.len(), self.pairs.len());
-        let built = build_tree(bounds, first_leaf, &mut self.pairs)?;
-        let contents = built.order.iter().map(|&i| stands_for(i as usize).encode());
-        self.leaves.extend(contents);
+        let first_group = self.groups.groups.len();
+        let root = build_tree(bounds, &stands_for, &mut self.groups)?;
         self.trees.push(TreeRow {
-            first_pair: first_pair as u32,
-            first_leaf: first_leaf as u32,
+            first_group: first_group as u32,
+            group_count: (self.groups.groups.len() - first_group) as u32,
             leaf_count: bounds.len() as u32,
             reserved: 0,
-            root: built.root,
+            root: Node::encode(&root, Link::Nothing),
         });
         Some(self.trees.len() as u32 - 1)
     }
@@ -87,8 +84,8 @@ impl LightTreeWriter {
         let mut file = ContainerWriter::default();
         file.section(records::META, false, meta.as_bytes());
         file.section(records::TREES, true, &self.trees);
-        file.section(records::NODES, true, &self.pairs);
-        file.section(records::LEAVES, true, &self.leaves);
+        file.section(records::GROUPS, true, &self.groups.groups);
+        file.section(records::PARENTS, true, &self.groups.parents);
         if !self.frames.is_empty() {
             file.section(records::FRAMES, true, &self.frames);
         }

@@ -1,7 +1,7 @@
 //! Building the trees of a shot.
 
 use super::Survey;
-use crate::light_tree::{ALGORITHM_VERSION, LeafContent, LightTreeWriter};
+use crate::light_tree::{ALGORITHM_VERSION, LightTreeWriter, Link};
 use crate::store::AlignedBytes;
 
 /// What a build is told besides the scene.
@@ -15,14 +15,14 @@ pub struct BuildOptions {
 /// The same survey gives the same bytes.
 pub fn build_tree(survey: &Survey, options: &BuildOptions) -> AlignedBytes {
     let mut writer = LightTreeWriter::default();
-    let fixed = writer.add_tree(&survey.fixed, |i| LeafContent::Emitter(i as u32));
+    let fixed = writer.add_tree(&survey.fixed, |i| Link::Emitter(i as u32));
     let first_moving = survey.fixed.len() as u32;
     for (frame, moving) in &survey.moving {
         let mut bounds = moving.clone();
         bounds.extend(fixed.map(|tree| writer.bounds_of(tree)));
         let tree = writer.add_tree(&bounds, |i| match i < moving.len() {
-            true => LeafContent::Emitter(first_moving + i as u32),
-            false => LeafContent::Tree(fixed.unwrap_or_default()),
+            true => Link::Emitter(first_moving + i as u32),
+            false => Link::Tree(fixed.unwrap_or_default()),
         });
         writer.add_frame(*frame, tree);
     }

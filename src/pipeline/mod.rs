@@ -1,6 +1,6 @@
 //! Floor 5: jobs, the only place where ingest meets the tree.
 //!
-//! [`load_scene`] reads a scene; [`survey`] finds out what its tree depends on; [`build_tree`] builds
+//! [`load_scene`] reads a scene; [`survey()`] finds out what its tree depends on; [`build_tree`] builds
 //! the trees of a shot; [`check_fresh`] tells whether a tree still belongs to a scene, and if not,
 //! which lights changed.
 

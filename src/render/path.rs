@@ -19,8 +19,6 @@ use glam::{Vec2, Vec3};
 
 /// Bounces after which a path may be ended by chance.
 const SURE_BOUNCES: u32 = 3;
-/// The part of the way to a light that a shadow ray looks at: it must not meet the light itself.
-const SHADOW_REACH: f32 = 1.0 - 1e-4;
 
 /// One frame, ready to be traced.
 pub struct Integrator<'a> {
@@ -80,6 +78,18 @@ struct Origin {
     bsdf_pdf: f32,
 }
 
+/// Light that may arrive at a vertex, if nothing is in its way.
+struct Incoming {
+    /// Unit, from the vertex.
+    direction: Vec3,
+    /// Nits; lux of a facing surface if `pdf` is `None`.
+    radiance: Rgb,
+    /// Density over solid angle, 1/sr; `None` for a direction or point that no ray can hit.
+    pdf: Option<f32>,
+    /// Where it comes from; `None` from infinity.
+    from: Option<Anchor>,
+}
+
 /// A point on the way, about to be lit.
 struct Vertex {
     anchor: Anchor,
@@ -115,7 +125,7 @@ impl Integrator<'_> {
             stats.rays += 1;
             let hit = self.tracer.closest(origin, direction, f32::INFINITY, &accept);
             let Some(hit) = hit else {
-                seen.radiance += throughput * self.from_infinity(direction, &before);
+                seen.radiance += throughput * self.emitted_at_infinity(direction, &before);
                 break;
             };
             seen.radiance += throughput * self.emitted(&hit, direction, &before);
@@ -178,21 +188,18 @@ impl Integrator<'_> {
         stats.light_picks += 1;
         let Some(pick) = self.picker.pick(&vertex.receiver, u_pick) else { return Rgb::ZERO };
         let sample = match pick.target {
-            Target::Emitter(emitter) => {
-                let sample = self.emitters.sample(emitter, vertex.receiver.point, u);
-                sample.map(|s| {
-                    let coverage = s.on_mesh.map_or(1.0, |place| {
-                        self.surfaces.coverage(place.instance, place.triangle, place.barycentric)
-                    });
-                    (s.direction, s.distance * SHADOW_REACH, s.radiance * coverage, s.pdf)
+            Target::Emitter(emitter) => self.sample_emitter(emitter, vertex, u),
+            Target::Infinite(row) => {
+                let found = self.infinite[row as usize].sample(vertex.receiver.normal, u);
+                found.map(|s| Incoming {
+                    direction: s.direction,
+                    radiance: s.radiance,
+                    pdf: s.pdf,
+                    from: None,
                 })
             }
-            Target::Infinite(row) => {
-                let sample = self.infinite[row as usize].sample(vertex.receiver.normal, u);
-                sample.map(|s| (s.direction, f32::INFINITY, s.radiance, s.pdf))
-            }
         };
-        let Some((direction, reach, radiance, pdf)) = sample else { return Rgb::ZERO };
+        let Some(Incoming { direction, radiance, pdf, from }) = sample else { return Rgb::ZERO };
         if !vertex.lets_through(direction) {
             return Rgb::ZERO;
         }
@@ -201,8 +208,14 @@ impl Integrator<'_> {
             return Rgb::ZERO;
         }
         stats.rays += 1;
-        let origin = vertex.anchor.origin_toward(direction);
-        if self.tracer.occluded(origin, direction, reach, accept) {
+        let blocked = match from {
+            Some(light) => self.tracer.occluded_between(&vertex.anchor, &light, accept),
+            None => {
+                let origin = vertex.anchor.origin_toward(direction);
+                self.tracer.occluded(origin, direction, f32::INFINITY, accept)
+            }
+        };
+        if blocked {
             return Rgb::ZERO;
         }
         let chance = pick.probability as f32;
@@ -215,6 +228,25 @@ impl Integrator<'_> {
                 reflected * radiance * (weight / density)
             }
         }
+    }
+
+    /// Light from a point of an emitter.
+    fn sample_emitter(&self, emitter: u32, vertex: &Vertex, u: Vec2) -> Option<Incoming> {
+        let s = self.emitters.sample(emitter, vertex.receiver.point, u)?;
+        let coverage = s.on_mesh.map_or(1.0, |place| {
+            self.surfaces.coverage(place.instance, place.triangle, place.barycentric)
+        });
+        let from = if s.normal == Vec3::ZERO {
+            Anchor::free(s.point)
+        } else {
+            Anchor::computed(s.point, s.normal, s.magnitude_m)
+        };
+        Some(Incoming {
+            direction: s.direction,
+            radiance: s.radiance * coverage,
+            pdf: s.pdf,
+            from: Some(from),
+        })
     }
 
     /// Light that a ray finds where it ends, weighed against having picked it.
@@ -249,7 +281,7 @@ impl Integrator<'_> {
     }
 
     /// Light from infinity along a ray, weighed likewise.
-    fn from_infinity(&self, direction: Vec3, before: &Option<Origin>) -> Rgb {
+    fn emitted_at_infinity(&self, direction: Vec3, before: &Option<Origin>) -> Rgb {
         let mut sum = Rgb::ZERO;
         for (row, light) in self.infinite.iter().enumerate() {
             let radiance = light.radiance(direction);
@@ -286,9 +318,10 @@ impl Vertex {
 
 /// Veach's power heuristic with exponent 2, safe where squares would overflow.
 fn power_heuristic(own: f32, other: f32) -> f32 {
-    if !(own > 0.0) {
-        return 0.0;
+    if own > 0.0 {
+        let ratio = other / own;
+        1.0 / (1.0 + ratio * ratio)
+    } else {
+        0.0
     }
-    let ratio = other / own;
-    1.0 / (1.0 + ratio * ratio)
 }

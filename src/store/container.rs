@@ -201,7 +201,8 @@ impl<D: AsRef<[u8]>> Container<D> {
             return Ok(None);
         };
         let size = size_of::<T>();
-        if section.element_size as usize != size || section.length as usize % size != 0 {
+        if section.element_size as usize != size || !(section.length as usize).is_multiple_of(size)
+        {
             let rule = format!("elements must be {size} bytes each");
             return Err(StoreError::Section { section: id, rule });
         }

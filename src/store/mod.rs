@@ -1,7 +1,7 @@
 //! Floor 1: bytes on disk, and nothing of what they mean.
 //!
 //! A [`Container`] is a header, a table of sections and the sections themselves, over mapped or owned
-//! bytes. [`map`] maps a file, [`write_atomically`] writes one that is either whole or not there.
+//! bytes. [`map()`] maps a file, [`write_atomically`] writes one that is either whole or not there.
 //! What the sections of a tree file hold is `light_tree`'s affair.
 #![doc = include_str!("format.md")]
 

@@ -1,8 +1,8 @@
 //! What the build promises: sound files, whose bytes depend on the set of bounds alone.
 
-use crate::support::{emitters, tree_over};
+use crate::support::{Tree, emitters, nodes, tree_over};
 use candelabra::bounds::{Aabb, Cone, LightBounds};
-use candelabra::light_tree::LightTree;
+use candelabra::light_tree::{LightTree, LightTreeWriter, Link, Receiver, WIDTH};
 use candelabra::store::AlignedBytes;
 use glam::Vec3;
 use proptest::prelude::*;
@@ -11,21 +11,13 @@ fn point(p: Vec3, energy: f32) -> LightBounds {
     LightBounds { aabb: Aabb::around([p]), cone: Cone::ALL, energy }
 }
 
-/// Depth of the deepest leaf, and the sum over all leaves of their depth.
+/// Groups above the deepest leaf.
 fn depth(bounds: &[LightBounds]) -> usize {
-    use candelabra::light_tree::Link;
-    let tree = tree_over(bounds);
-    let mut deepest = 0;
-    let mut open = vec![(tree.trees()[0].root.link(), 0)];
-    while let Some((link, depth)) = open.pop() {
-        match link {
-            Link::Leaf(_) => deepest = deepest.max(depth),
-            Link::Inner(at) => {
-                open.extend(tree.pairs()[at as usize].iter().map(|node| (node.link(), depth + 1)));
-            }
-        }
-    }
-    deepest
+    nodes(&tree_over(bounds)).into_iter().map(|(_, depth)| depth).max().unwrap_or_default()
+}
+
+fn groups_as_bytes(tree: &Tree) -> &[u8] {
+    bytemuck::cast_slice(tree.groups())
 }
 
 proptest! {
@@ -49,18 +41,19 @@ proptest! {
             shuffled.swap(i, (state >> 33) as usize % (i + 1));
         }
         let (a, b) = (tree_over(&bounds), tree_over(&shuffled));
-        prop_assert_eq!(
-            bytemuck::cast_slice::<_, u8>(a.pairs()),
-            bytemuck::cast_slice::<_, u8>(b.pairs())
-        );
+        // Leaves name their emitters by number, which the shuffle changed: compare what they bound.
+        let bounds_in_order = |tree: &Tree| {
+            nodes(tree).into_iter().map(|(node, depth)| (node.bounds(), depth)).collect::<Vec<_>>()
+        };
+        prop_assert_eq!(bounds_in_order(&a), bounds_in_order(&b));
     }
 
     #[test]
     fn damaged_bytes_are_refused_or_at_least_harmless(
         bounds in emitters(20), at in any::<prop::sample::Index>(), bit in 0u8..8
     ) {
-        let mut writer = candelabra::light_tree::LightTreeWriter::default();
-        writer.add_tree(&bounds, |i| candelabra::light_tree::LeafContent::Emitter(i as u32));
+        let mut writer = LightTreeWriter::default();
+        writer.add_tree(&bounds, |i| Link::Emitter(i as u32));
         let bytes = writer.finish("", [0; 32]);
         let mut damaged = bytes.as_ref().to_vec();
         damaged[at.index(bytes.as_ref().len())] ^= 1 << bit;
@@ -68,7 +61,7 @@ proptest! {
         prop_assert!(tree.verify().is_err());
         let table = tree.leaf_table();
         let frame = tree.at_frame(0, &table).unwrap();
-        let receiver = candelabra::light_tree::Receiver { point: Vec3::ONE, normal: Vec3::Z };
+        let receiver = Receiver { point: Vec3::ONE, normal: Vec3::Z };
         for i in 0..16 {
             frame.sample(&receiver, f64::from(i) / 16.0);
             frame.probability(&receiver, i);
@@ -77,21 +70,12 @@ proptest! {
 }
 
 /// The leaf bounds of each emitter, in the emitters' order.
-fn leaf_bounds(tree: &crate::support::Tree) -> Vec<LightBounds> {
-    use candelabra::light_tree::{LeafContent, Link};
-    let row = &tree.trees()[0];
-    let mut nodes = vec![&row.root];
-    nodes.extend(tree.pairs().iter().flatten());
-    let mut found: Vec<_> = nodes
-        .into_iter()
-        .filter_map(|node| match node.link() {
-            Link::Leaf(leaf) => match LeafContent::decode(tree.leaves()[leaf as usize]) {
-                LeafContent::Emitter(emitter) => Some((emitter, node.bounds())),
-                LeafContent::Tree(_) => None,
-            },
-            Link::Inner(_) => None,
-        })
-        .collect();
+fn leaf_bounds(tree: &Tree) -> Vec<LightBounds> {
+    let leaf = |(node, _): (candelabra::light_tree::Node, usize)| match node.link() {
+        Link::Emitter(emitter) => Some((emitter, node.bounds())),
+        _ => None,
+    };
+    let mut found: Vec<_> = nodes(tree).into_iter().filter_map(leaf).collect();
     found.sort_by_key(|(emitter, _)| *emitter);
     found.into_iter().map(|(_, bounds)| bounds).collect()
 }
@@ -106,14 +90,15 @@ fn one_thread_and_two_give_the_same_bytes() {
         .collect();
     let with = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| bytemuck::cast_slice::<_, u8>(tree_over(&bounds).pairs()).to_vec())
+        pool.install(|| groups_as_bytes(&tree_over(&bounds)).to_vec())
     };
     assert!(with(1) == with(2));
 }
 
 #[test]
 fn coincident_lights_make_a_balanced_tree() {
-    assert_eq!(depth(&vec![point(Vec3::ONE, 1.0); 1024]), 10);
+    // 1024 = 8 * 8 * 8 * 2: four groups above a leaf, the first at depth 0.
+    assert_eq!(depth(&vec![point(Vec3::ONE, 1.0); 1024]), 3);
 }
 
 #[test]
@@ -126,11 +111,16 @@ fn lights_on_a_line_or_plane_are_sorted_along_any_axis() {
     for line in lines {
         let tree = tree_over(&on(line));
         assert_eq!(tree.verify(), Ok(()));
-        // A sorted tree: every pair divides its stretch of the line without overlap.
-        for [left, right] in tree.pairs() {
-            let apart = (left.center() - right.center()).abs().max_element();
-            let reach = (left.half_extent() + right.half_extent()).max_element();
-            assert!(reach <= apart * 1.02, "{reach} {apart}");
+        // A sorted tree: the children of a group divide their stretch of the line.
+        for group in tree.groups() {
+            let mut children: Vec<_> = group.nodes().collect();
+            let along = |node: &candelabra::light_tree::Node| node.center().element_sum();
+            children.sort_by(|a, b| along(a).total_cmp(&along(b)));
+            for pair in children.windows(2) {
+                let apart = along(&pair[1]) - along(&pair[0]);
+                let reach = (pair[0].half_extent() + pair[1].half_extent()).max_element();
+                assert!(reach <= apart * 1.02, "{reach} {apart}");
+            }
         }
     }
 }
@@ -140,14 +130,16 @@ fn energies_of_sixty_orders_of_magnitude_add_up() {
     let bounds: Vec<_> =
         (0..61).map(|i| point(Vec3::splat(i as f32), 10f32.powi(i - 30))).collect();
     assert_eq!(tree_over(&bounds).verify(), Ok(()));
-    assert!(depth(&bounds) <= 64);
+    assert!(depth(&bounds) <= 16);
 }
 
 #[test]
 fn no_lights_make_an_empty_file_and_one_light_a_root() {
     let none = tree_over(&[]);
-    assert!(none.trees().is_empty() && none.pairs().is_empty());
+    assert!(none.trees().is_empty() && none.groups().is_empty());
     let one = tree_over(&[point(Vec3::ZERO, 3.0)]);
     assert_eq!(one.verify(), Ok(()));
-    assert_eq!((one.trees().len(), one.pairs().len(), one.leaves()), (1, 0, &[0][..]));
+    assert_eq!((one.trees().len(), one.groups().len()), (1, 1));
+    assert_eq!(one.groups()[0].link(0), Link::Emitter(0));
+    assert!((1..WIDTH).all(|lane| one.groups()[0].link(lane) == Link::Nothing));
 }

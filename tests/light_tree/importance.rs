@@ -35,24 +35,32 @@ proptest! {
         let tree = tree_over(&bounds);
         // Emitters that light the receiver, by leaf; then no cluster above one may be called dark.
         for bounds in &bounds {
-            let node = Node::encode(bounds, Link::Leaf(0));
+            let node = Node::encode(bounds, Link::Emitter(0));
             prop_assert!(node.importance(&receiver) > 0.0 || !can_light(bounds, &receiver));
         }
-        let mut open = vec![tree.trees()[0].root];
-        while let Some(node) = open.pop() {
-            if node.importance(&receiver) == 0.0 {
-                let mut below = vec![node];
-                while let Some(node) = below.pop() {
-                    match node.link() {
-                        Link::Inner(at) => below.extend(tree.pairs()[at as usize]),
-                        Link::Leaf(leaf) => {
-                            let emitter = tree.leaves()[leaf as usize] as usize;
-                            prop_assert!(!can_light(&bounds[emitter], &receiver));
-                        }
+        let row = &tree.trees()[0];
+        let mut open = vec![(row.root, row.first_group, false)];
+        while let Some((node, children, dark)) = open.pop() {
+            let dark = dark || node.importance(&receiver) == 0.0;
+            for child in tree.groups()[children as usize].nodes() {
+                match child.link() {
+                    Link::Inner(ahead) => open.push((child, children + ahead, dark)),
+                    Link::Emitter(emitter) => {
+                        prop_assert!(!dark || !can_light(&bounds[emitter as usize], &receiver));
                     }
+                    Link::Tree(_) | Link::Nothing => unreachable!(),
                 }
-            } else if let Link::Inner(at) = node.link() {
-                open.extend(tree.pairs()[at as usize]);
+            }
+        }
+    }
+
+    #[test]
+    fn eight_lanes_weigh_what_eight_nodes_weigh(bounds in emitters(60), receiver in receiver()) {
+        for group in tree_over(&bounds).groups() {
+            let weights = group.importances(&receiver);
+            for (lane, weight) in weights.into_iter().enumerate() {
+                let alone = group.node(lane).map_or(0.0, |node| node.importance(&receiver));
+                prop_assert_eq!(weight, alone);
             }
         }
     }
@@ -69,8 +77,8 @@ proptest! {
             },
             ..bounds[0]
         };
-        let at = Node::encode(&bounds[0], Link::Leaf(0)).importance(&receiver);
-        let scaled = Node::encode(&scaled_bounds, Link::Leaf(0))
+        let at = Node::encode(&bounds[0], Link::Emitter(0)).importance(&receiver);
+        let scaled = Node::encode(&scaled_bounds, Link::Emitter(0))
             .importance(&Receiver { point: receiver.point * scale, ..receiver });
         prop_assert!(at >= 0.0 && at.is_finite());
         let expected = at / f64::from(scale).powi(2);
@@ -85,7 +93,7 @@ fn a_point_obeys_the_inverse_square_and_the_cosine() {
         cone: candelabra::bounds::Cone::ALL,
         energy: 8.0,
     };
-    let node = Node::encode(&bounds, Link::Leaf(0));
+    let node = Node::encode(&bounds, Link::Emitter(0));
     let facing = Receiver { point: Vec3::ZERO, normal: Vec3::Z };
     assert!((node.importance(&facing) - 2.0).abs() < 1e-6);
     let tilted = Receiver { normal: Vec3::new(0.6, 0.0, 0.8), ..facing };

@@ -1,7 +1,7 @@
 //! Random and adversarial sets of light bounds, and trees over them.
 
 use candelabra::bounds::{Aabb, Cone, LightBounds};
-use candelabra::light_tree::{LeafContent, LightSummary, LightTree, LightTreeWriter, Receiver};
+use candelabra::light_tree::{LightSummary, LightTree, LightTreeWriter, Link, Node, Receiver};
 use candelabra::store::AlignedBytes;
 use glam::Vec3;
 use proptest::prelude::*;
@@ -12,7 +12,7 @@ pub type Tree = LightTree<AlignedBytes>;
 /// A tree file over some bounds, all of one light.
 pub fn tree_over(bounds: &[LightBounds]) -> Tree {
     let mut writer = LightTreeWriter::default();
-    writer.add_tree(bounds, |i| LeafContent::Emitter(i as u32));
+    writer.add_tree(bounds, |i| Link::Emitter(i as u32));
     writer.add_light(&LightSummary {
         path: "/lights".into(),
         fingerprint: [1; 32],
@@ -68,26 +68,43 @@ pub fn receiver() -> impl Strategy<Value = Receiver> {
         .prop_map(|(p, far, normal)| Receiver { point: p * far, normal })
 }
 
-/// The probability that `sample` gives to nothing at all: descents that end where both children
+/// Every node of the first tree with the number of groups above it, from the root down.
+pub fn nodes(tree: &Tree) -> Vec<(Node, usize)> {
+    let row = &tree.trees()[0];
+    let mut found = Vec::new();
+    let mut open = vec![(row.first_group, 0)];
+    while let Some((at, depth)) = open.pop() {
+        for node in tree.groups()[at as usize].nodes() {
+            found.push((node, depth));
+            if let Link::Inner(ahead) = node.link() {
+                open.push((at + ahead, depth + 1));
+            }
+        }
+    }
+    found
+}
+
+/// The probability that `sample` gives to nothing at all: descents that end where all children
 /// turn out to be dark.
 pub fn dead_probability(tree: &Tree, receiver: &Receiver) -> f64 {
-    use candelabra::light_tree::Link;
-    let root = &tree.trees()[0].root;
-    if root.importance(receiver) == 0.0 {
+    let row = &tree.trees()[0];
+    if row.root.importance(receiver) == 0.0 {
         return 1.0;
     }
     let mut dead = 0.0;
-    let mut open = vec![(root.link(), 1.0)];
-    while let Some((link, probability)) = open.pop() {
-        let Link::Inner(at) = link else { continue };
-        let [left, right] = &tree.pairs()[at as usize];
-        let (l, r) = (left.importance(receiver), right.importance(receiver));
-        if l + r == 0.0 {
+    let mut open = vec![(row.first_group, 1.0)];
+    while let Some((at, probability)) = open.pop() {
+        let group = &tree.groups()[at as usize];
+        let total: f64 = group.nodes().map(|node| node.importance(receiver)).sum();
+        if total == 0.0 {
             dead += probability;
             continue;
         }
-        open.push((left.link(), probability * l / (l + r)));
-        open.push((right.link(), probability * r / (l + r)));
+        for node in group.nodes() {
+            if let Link::Inner(ahead) = node.link() {
+                open.push((at + ahead, probability * node.importance(receiver) / total));
+            }
+        }
     }
     dead
 }

@@ -47,6 +47,9 @@ pub struct Arguments {
     /// Write a PNG beside each picture
     #[arg(long)]
     pub png: bool,
+    /// Exposure of the PNG in stops; chosen from the first picture if not given
+    #[arg(long, allow_negative_numbers = true, requires = "png")]
+    pub exposure: Option<f32>,
     /// Beauty in 32-bit floats instead of 16
     #[arg(long)]
     pub float: bool,

@@ -126,7 +126,7 @@ fn render_frames<D: AsRef<[u8]> + Sync>(
     let bar = Bar::new(frames.as_slice().len(), height);
     // Prepared when the first frame needs it: a finished shot resumes at once.
     let mut delegate = None;
-    let (mut failed, mut exposure) = (0, None);
+    let (mut failed, mut exposure) = (0, arguments.exposure);
     for &frame in frames.as_slice() {
         let path = arguments.output.path(frame);
         let stamp = stamp_of(frame)?;

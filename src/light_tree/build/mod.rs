@@ -1,26 +1,32 @@
-//! The build: light bounds in, nodes and an order of leaves out.
+//! The build: light bounds in, groups out.
 //!
-//! Top-down partition by the surface area orientation heuristic ([`saoh`]), in parallel, and
-//! bottom-up bounds. What the bytes depend on is the *set* of bounds: the items are first brought
-//! into a canonical order, every sum runs in that order, and each task writes to a place that the
-//! counts alone decide. Neither the number of threads nor the order of the input shows.
+//! Top-down: a cluster is cut in two by the surface area orientation heuristic ([`saoh`]), then its
+//! costliest part, and so on until there are eight, which become the lanes of its group. Bounds
+//! are then gathered bottom-up.
+//!
+//! What the bytes depend on is the *set* of bounds: the items are first brought into a canonical
+//! order, every sum runs in that order, and what tasks built side by side is put together in that
+//! order. Neither the number of threads nor the order of the input shows.
 
 mod bins;
 mod order;
 mod saoh;
 
-use super::node::{Link, Node, Pair};
+use super::group::{Group, WIDTH};
+use super::node::{Link, MOST, Node};
+use super::records::Parent;
 use crate::bounds::LightBounds;
 use bytemuck::Zeroable;
+use rayon::prelude::*;
+use saoh::Halves;
 
 /// Changes whenever the same bounds would give other bytes: part of every fingerprint.
-pub const ALGORITHM_VERSION: u32 = 1;
+pub const ALGORITHM_VERSION: u32 = 2;
 
-/// Beyond this depth clusters are halved by count: no input makes the recursion deeper than this
-/// plus 31.
-const DEEPEST_BY_COST: usize = 200;
-/// Smaller clusters are built by the task that found them.
-const PARALLEL_ABOVE: usize = 2048;
+/// Below this depth clusters are cut by count: no input makes the recursion much deeper.
+const DEEPEST_BY_COST: usize = 100;
+/// The children of larger clusters are built side by side.
+const PARALLEL_ABOVE: usize = 4096;
 
 /// Bounds, and where they stood in the input.
 #[derive(Clone, Copy)]
@@ -29,95 +35,115 @@ pub(super) struct Item {
     index: u32,
 }
 
-/// One tree within a file: its nodes are in the file's pairs.
-#[derive(Clone, Debug)]
-pub(super) struct BuiltTree {
-    /// Bounds of everything.
-    pub root: Node,
-    /// For each leaf from left to right, which of the input bounds it is.
-    pub order: Vec<u32>,
+/// Groups in preorder: a group stands before those of its children.
+#[derive(Default)]
+pub(super) struct Groups {
+    pub groups: Vec<Group>,
+    /// For each group the lane that leads to it.
+    pub parents: Vec<Parent>,
+}
+
+impl Groups {
+    fn append(&mut self, mut other: Groups) {
+        self.groups.append(&mut other.groups);
+        self.parents.append(&mut other.parents);
+    }
 }
 
 /// Builds a tree over some bounds, all of them [sound](LightBounds::is_sound), and appends its
-/// pairs to `pairs` and numbers its leaves from `first_leaf`. No bounds give no tree.
+/// groups to `out`; `link` tells what each of the bounds is. Returns the bounds of everything;
+/// `None` if there are none.
 ///
 /// # Panics
-/// If a number would reach 2^31.
+/// If there are 2^30 bounds or more.
 pub(super) fn build_tree(
     bounds: &[LightBounds],
-    first_leaf: usize,
-    pairs: &mut Vec<Pair>,
-) -> Option<BuiltTree> {
+    link: &(impl Fn(usize) -> Link + Sync),
+    out: &mut Groups,
+) -> Option<LightBounds> {
+    assert!(bounds.len() < MOST, "a tree has fewer than 2^30 leaves");
     if bounds.is_empty() {
         return None;
     }
-    let first_pair = pairs.len();
-    let pair_count = bounds.len() - 1;
-    assert!(first_leaf + bounds.len() <= 1 << 31, "a file has at most 2^31 leaves");
-    let mut items = order::canonical(bounds);
-    pairs.resize(first_pair + pair_count, Pair::zeroed());
-    let place = Place { first_leaf: first_leaf as u32, first_pair: first_pair as u32, depth: 0 };
-    let root = build_cluster(&mut items, &mut pairs[first_pair..], place);
-    let root = Node::encode(&root, place.link(items.len()));
-    Some(BuiltTree { root, order: items.iter().map(|item| item.index).collect() })
+    Some(build_cluster(&mut order::canonical(bounds), link, 0, out))
 }
 
-/// Where a cluster's nodes go.
-#[derive(Clone, Copy)]
-struct Place {
-    first_leaf: u32,
-    first_pair: u32,
+/// Builds the groups of a cluster and returns its bounds as its nodes have them: rounded outwards
+/// already, so that what a node says of itself contains what its children say.
+fn build_cluster(
+    items: &mut [Item],
+    link: &(impl Fn(usize) -> Link + Sync),
     depth: usize,
-}
-
-impl Place {
-    /// The places of two children, the left with `left_count` leaves (see the format: a cluster's
-    /// own pair comes first, then the left's pairs, then the right's).
-    fn children(self, left_count: usize) -> (Place, Place) {
-        let depth = self.depth + 1;
-        let left = Place { first_pair: self.first_pair + 1, depth, ..self };
-        let right = Place {
-            first_leaf: self.first_leaf + left_count as u32,
-            first_pair: self.first_pair + left_count as u32,
-            depth,
-        };
-        (left, right)
-    }
-
-    /// The link to a cluster of `count` leaves that is placed here.
-    fn link(self, count: usize) -> Link {
-        if count == 1 { Link::Leaf(self.first_leaf) } else { Link::Inner(self.first_pair) }
-    }
-}
-
-/// Builds everything below a cluster and returns the cluster's bounds as its children's nodes
-/// have them: rounded outwards already, so that what a node says of itself contains what its
-/// children say.
-fn build_cluster(items: &mut [Item], pairs: &mut [Pair], place: Place) -> LightBounds {
-    if let [item] = items {
-        return item.bounds;
-    }
-    let left_count = if place.depth < DEEPEST_BY_COST {
-        saoh::partition(items).unwrap_or(items.len() / 2)
-    } else {
-        items.len() / 2
-    };
-    let (left_place, right_place) = place.children(left_count);
-    let right_count = items.len() - left_count;
+    out: &mut Groups,
+) -> LightBounds {
+    let own = out.groups.len();
+    out.groups.push(Group::zeroed());
+    out.parents.push(Parent::NONE);
     let go_parallel = items.len() > PARALLEL_ABOVE;
-    let (left_items, right_items) = items.split_at_mut(left_count);
-    let (own, below) = pairs.split_first_mut().expect("n items have n - 1 pairs");
-    let (left_pairs, right_pairs) = below.split_at_mut(left_count - 1);
-    let mut build_left = || build_cluster(left_items, left_pairs, left_place);
-    let mut build_right = || build_cluster(right_items, right_pairs, right_place);
-    let (left, right) = if go_parallel {
-        rayon::join(build_left, build_right)
-    } else {
-        (build_left(), build_right())
+    let mut parts = divide(items, depth);
+    let build_apart = |part: &mut &mut [Item]| {
+        let mut groups = Groups::default();
+        let bounds = (part.len() > 1).then(|| build_cluster(part, link, depth + 1, &mut groups));
+        (bounds, groups)
     };
-    *own = [
-        Node::encode(&left, left_place.link(left_count)),
-        Node::encode(&right, right_place.link(right_count)),
-    ];
-    own[0].bounds().union(&own[1].bounds())
+    let mut apart: Vec<_> =
+        if go_parallel { parts.par_iter_mut().map(build_apart).collect() } else { Vec::new() };
+    let mut nodes = Vec::with_capacity(WIDTH);
+    for (lane, part) in parts.into_iter().enumerate() {
+        if let [item] = part {
+            nodes.push(Node::encode(&item.bounds, link(item.index as usize)));
+            continue;
+        }
+        let first = out.groups.len();
+        let bounds = match apart.get_mut(lane).map(std::mem::take) {
+            Some((Some(bounds), groups)) => {
+                out.append(groups);
+                bounds
+            }
+            _ => build_cluster(part, link, depth + 1, out),
+        };
+        let ahead = (first - own) as u32;
+        out.parents[first] = Parent::new(ahead, lane);
+        nodes.push(Node::encode(&bounds, Link::Inner(ahead)));
+    }
+    for (lane, node) in nodes.iter().enumerate() {
+        out.groups[own].set(lane, node);
+    }
+    let rounded: Vec<LightBounds> = nodes.iter().map(Node::bounds).collect();
+    LightBounds::around(&rounded)
+}
+
+/// Cuts a cluster into up to eight parts: the costliest first of those that fill a group of their
+/// own. Lanes that are left then take the leaves of the smallest parts, whose groups would be nearly
+/// empty.
+fn divide(items: &mut [Item], depth: usize) -> Vec<&mut [Item]> {
+    let mut parts: Vec<&mut [Item]> = vec![items];
+    let mut costs = vec![f64::INFINITY];
+    while let Some(at) = next_to_cut(&parts, &costs) {
+        let part = std::mem::take(&mut parts[at]);
+        let by_cost = if depth < DEEPEST_BY_COST { saoh::partition(part) } else { None };
+        let Halves { left_count, cost } = by_cost.unwrap_or(Halves::even(part.len()));
+        let (left, right) = part.split_at_mut(left_count);
+        parts.splice(at..=at, [left, right]);
+        costs.splice(at..=at, cost);
+    }
+    parts
+}
+
+/// Which part to cut next; `None` if all lanes are used or none can be cut.
+fn next_to_cut(parts: &[&mut [Item]], costs: &[f64]) -> Option<usize> {
+    let lanes_left = WIDTH - parts.len();
+    if lanes_left == 0 {
+        return None;
+    }
+    // Coincident lights cost nothing: then the largest.
+    let by_cost = |&a: &usize, &b: &usize| {
+        costs[a].total_cmp(&costs[b]).then(parts[a].len().cmp(&parts[b].len()))
+    };
+    let all = 0..parts.len();
+    let large = all.clone().filter(|&i| parts[i].len() > WIDTH).max_by(by_cost);
+    large.or_else(|| {
+        let small = all.filter(|&i| parts[i].len() > 1);
+        small.min_by_key(|&i| parts[i].len())
+    })
 }

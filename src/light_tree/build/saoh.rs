@@ -18,18 +18,35 @@ const EXACT_UP_TO: usize = BINS;
 /// Items summed by one task, in a fixed grouping: sums must not depend on the thread count.
 const CHUNK: usize = 1 << 15;
 
+/// A cluster, cut in two.
+pub struct Halves {
+    /// How many items are in the first half.
+    pub left_count: usize,
+    /// What each half costs.
+    pub cost: [f64; 2],
+}
+
+impl Halves {
+    /// A cut by count, of items that cannot be told apart.
+    pub fn even(count: usize) -> Halves {
+        Halves { left_count: count / 2, cost: [0.0; 2] }
+    }
+}
+
 /// The cheapest cut found: after bin (or item) `after` along `axis`.
 struct Cut {
-    cost: f64,
+    /// With `Kr`.
+    total: f64,
+    cost: [f64; 2],
     axis: usize,
     after: usize,
 }
 
-/// Reorders the items into two non-empty halves and returns the size of the first; `None` if all
-/// their centres coincide, so that no cut is better than another.
-pub fn partition(items: &mut [Item]) -> Option<usize> {
-    if items.len() == 2 {
-        return Some(1);
+/// Reorders the items into two non-empty halves; `None` if all their centres coincide, so that no
+/// cut is better than another.
+pub fn partition(items: &mut [Item]) -> Option<Halves> {
+    if let [left, right] = items {
+        return Some(Halves { left_count: 1, cost: [Bin::of(left).cost(), Bin::of(right).cost()] });
     }
     let centers = center_box(items);
     if items.len() <= EXACT_UP_TO {
@@ -59,7 +76,7 @@ fn regularisation(centers: &Aabb) -> [Option<f64>; 3] {
     extent.to_array().map(|along| (along > 0.0).then(|| extent.max_element() / along))
 }
 
-fn partition_exactly(items: &mut [Item], centers: &Aabb) -> Option<usize> {
+fn partition_exactly(items: &mut [Item], centers: &Aabb) -> Option<Halves> {
     let count = items.len();
     let mut best: Option<Cut> = None;
     let sort = |items: &mut [Item], axis: usize| {
@@ -80,10 +97,10 @@ fn partition_exactly(items: &mut [Item], centers: &Aabb) -> Option<usize> {
     }
     let cut = best?;
     sort(items, cut.axis);
-    Some(cut.after + 1)
+    Some(Halves { left_count: cut.after + 1, cost: cut.cost })
 }
 
-fn partition_binned(items: &mut [Item], centers: &Aabb) -> Option<usize> {
+fn partition_binned(items: &mut [Item], centers: &Aabb) -> Option<Halves> {
     let slabs = Slabs::new(centers);
     let fill = |chunk: &[Item]| {
         let mut bins = [[Bin::EMPTY; BINS]; 3];
@@ -114,8 +131,9 @@ fn partition_binned(items: &mut [Item], centers: &Aabb) -> Option<usize> {
             cheapest_cut(&bins[axis], axis, kr, &mut best);
         }
     }
-    let Cut { axis, after, .. } = best?;
-    Some(move_to_front(items, |item| slabs.of(center(item))[axis] <= after))
+    let Cut { axis, after, cost, .. } = best?;
+    let left_count = move_to_front(items, |item| slabs.of(center(item))[axis] <= after);
+    Some(Halves { left_count, cost })
 }
 
 /// Tries every cut between bins; keeps the first of equals.
@@ -126,14 +144,15 @@ fn cheapest_cut(bins: &[Bin], axis: usize, kr: f64, best: &mut Option<Cut>) {
         right.merge(&bins[i]);
         right_costs[i] = right.cost();
     }
-    let total = right.count + bins[0].count;
+    let count = right.count + bins[0].count;
     let mut left = Bin::EMPTY;
     for after in 0..bins.len() - 1 {
         left.merge(&bins[after]);
-        let divides = bins[after].count > 0 && left.count < total;
-        let cost = kr * (left.cost() + right_costs[after + 1]);
-        if divides && best.as_ref().is_none_or(|best| cost < best.cost) {
-            *best = Some(Cut { cost, axis, after });
+        let divides = bins[after].count > 0 && left.count < count;
+        let cost = [left.cost(), right_costs[after + 1]];
+        let total = kr * (cost[0] + cost[1]);
+        if divides && best.as_ref().is_none_or(|best| total < best.total) {
+            *best = Some(Cut { total, cost, axis, after });
         }
     }
 }

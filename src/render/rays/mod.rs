@@ -64,7 +64,7 @@ struct Placed {
 impl RayScene {
     /// Prepares what does not change in a shot. `pose` may be that of any of its frames.
     pub fn new(scene: &Scene, pose: &Pose) -> RayScene {
-        let moving = moving_nodes(scene);
+        let moving = scene.moving_nodes();
         let mut uses = vec![0_usize; scene.meshes.len()];
         for instance in &scene.instances {
             uses[instance.mesh as usize] += 1;
@@ -108,16 +108,6 @@ impl RayScene {
     pub fn for_pose(&self, scene: &Scene, pose: &Pose) -> Tracer<'_> {
         Tracer::new(self, scene, pose)
     }
-}
-
-/// Nodes with an animated channel on themselves or above.
-fn moving_nodes(scene: &Scene) -> Vec<bool> {
-    let mut moving = Vec::with_capacity(scene.nodes.len());
-    for node in &scene.nodes {
-        let above = node.parent.is_some_and(|parent| moving[parent as usize]);
-        moving.push(above || !node.channels.is_empty());
-    }
-    moving
 }
 
 fn is_cutout(scene: &Scene, instance: &Instance) -> bool {

@@ -1,0 +1,21 @@
+#!/bin/sh
+# Every check: format, lints, documentation, the Rust tests, the exporter's tests.
+#
+# Tests that read the scenes of other people look for them in ../shared, or where CANDELABRA_SHARED
+# points, and are skipped if they are not there.
+set -eu
+cd "$(dirname "$0")/.."
+. scripts/environment.sh
+
+echo "== format"
+cargo fmt --check
+echo "== lints"
+cargo clippy --quiet --all-targets -- -D warnings
+echo "== documentation"
+RUSTDOCFLAGS="-D warnings" cargo doc --quiet --no-deps --document-private-items
+echo "== tests"
+cargo test --quiet
+echo "== exporter"
+environment scripts/requirements.txt scripts/requirements-test.txt
+"$python" -m pytest --quiet tests/exporter
+echo "all checks pass"

@@ -1,0 +1,126 @@
+//! What a tree over a million triangles costs: building, picking, opening, bytes, memory.
+//!
+//! `cargo bench --bench light_tree`
+
+use candelabra::bounds::{Aabb, Cone, LightBounds};
+use candelabra::light_tree::{LightSummary, LightTree, LightTreeWriter, Link, Receiver};
+use candelabra::math::random::{hash, widen};
+use candelabra::pipeline::open_tree;
+use candelabra::store::AlignedBytes;
+use criterion::{Criterion, criterion_group};
+use glam::Vec3;
+use std::hint::black_box;
+use std::time::Duration;
+
+const EMITTERS: u32 = 1_000_000;
+
+/// The `n`th number of stream `i`, in `[0, 1)`.
+fn random(i: u32, n: u32) -> f32 {
+    (hash(i, n) >> 8) as f32 / 16_777_216.0
+}
+
+fn direction(i: u32, n: u32) -> Vec3 {
+    let (z, phi) = (1.0 - 2.0 * random(i, n), std::f32::consts::TAU * random(i, n + 1));
+    let radius = (1.0 - z * z).sqrt();
+    Vec3::new(radius * phi.cos(), radius * phi.sin(), z)
+}
+
+/// Small triangles facing every way, in a box of 100 x 20 x 100 metres.
+fn triangles(count: u32) -> Vec<LightBounds> {
+    (0..count)
+        .map(|i| {
+            let a = Vec3::new(random(i, 0), 0.2 * random(i, 1), random(i, 2)) * 100.0;
+            let (b, c) = (a + 0.05 * direction(i, 3), a + 0.05 * direction(i, 5));
+            let normal = (b - a).cross(c - a);
+            LightBounds {
+                aabb: Aabb::around([a, b, c]),
+                cone: Cone::flat(normal.normalize_or(Vec3::Z), false),
+                energy: normal.length() * (0.5 + random(i, 7)) + 1e-9,
+            }
+        })
+        .collect()
+}
+
+fn build(bounds: &[LightBounds]) -> AlignedBytes {
+    let mut writer = LightTreeWriter::default();
+    writer.add_tree(bounds, |i| Link::Emitter(i as u32));
+    writer.add_light(&LightSummary {
+        path: "/mesh".into(),
+        fingerprint: [0; 32],
+        emitter_count: bounds.len() as u32,
+        energy: 1.0,
+        moves: false,
+    });
+    writer.finish("{}", [0; 32])
+}
+
+fn benchmarks(criterion: &mut Criterion) {
+    let mut group = criterion.benchmark_group("a million triangles");
+    group.sample_size(10).measurement_time(Duration::from_secs(20));
+
+    let bounds = triangles(EMITTERS);
+    group.bench_function("build, two threads", |b| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().unwrap();
+        b.iter(|| pool.install(|| build(black_box(&bounds))));
+    });
+
+    let bytes = build(&bounds);
+    let each = bytes.as_ref().len() as f64 / f64::from(EMITTERS);
+    println!("file: {} bytes, {each:.1} an emitter", bytes.as_ref().len());
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("million.ltree");
+    std::fs::write(&path, bytes.as_ref()).unwrap();
+    group.bench_function("open and verify", |b| b.iter(|| open_tree(&path, true).unwrap()));
+    group.bench_function("open", |b| b.iter(|| open_tree(&path, false).unwrap()));
+
+    let tree = LightTree::open(bytes).unwrap();
+    let leaves = tree.leaf_table();
+    let frame = tree.at_frame(0, &leaves).unwrap();
+    // Receivers of a picture: neighbours in space, as paths visit them.
+    let receiver = |i: u32| Receiver {
+        point: Vec3::new(random(i >> 10, 0), 0.0, random(i >> 10, 1)) * 100.0
+            + 0.1 * Vec3::new(random(i, 2), 0.0, random(i, 3)),
+        normal: Vec3::Y,
+    };
+    let mut next = 0;
+    group.bench_function("one pick, one thread", |b| {
+        b.iter(|| {
+            next += 1;
+            frame.sample(&receiver(next), widen(random(next, 4), next))
+        });
+    });
+    group.bench_function("one probability, one thread", |b| {
+        b.iter(|| {
+            next += 1;
+            frame.probability(&receiver(next), hash(next, 5) % EMITTERS)
+        });
+    });
+    group.finish();
+}
+
+/// The most memory this process has used so far, bytes.
+fn peak_memory() -> Option<u64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find(|line| line.starts_with("VmHWM:"))?;
+    Some(line.split_whitespace().nth(1)?.parse::<u64>().ok()? * 1024)
+}
+
+criterion_group!(timed, benchmarks);
+
+fn main() {
+    // First of all, while the process is small: what one build needs.
+    let bounds = triangles(EMITTERS);
+    let before = peak_memory();
+    drop(black_box(build(&bounds)));
+    if let (Some(before), Some(after)) = (before, peak_memory()) {
+        let megabytes = |bytes: u64| bytes as f64 / 1e6;
+        println!(
+            "peak memory of a build: {:.0} MB, of which {:.0} MB are the bounds it was given",
+            megabytes(after),
+            megabytes(before)
+        );
+    }
+    drop(bounds);
+    timed();
+    Criterion::default().configure_from_args().final_summary();
+}
