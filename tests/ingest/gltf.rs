@@ -73,6 +73,16 @@ fn transforms_are_read_as_they_are() {
 }
 
 #[test]
+fn large_translations_keep_their_small_part() {
+    let mut file = lamp();
+    file.json["nodes"][0]["translation"] = json!([1e9 + 0.125, 0, 0]);
+    file.json["nodes"][0]["children"] = json!([1]);
+    file.add("nodes", json!({"translation": [-1e9, 0, 0]}));
+    let world = file.load().unwrap().pose_at(0.0).world(1);
+    assert_eq!(world.translation, Vec3::new(0.125, 0.0, 0.0).into());
+}
+
+#[test]
 fn gpu_instances_become_nodes() {
     let mut file = lamp();
     let places = file.floats(&[1.0, 0.0, 0.0, 2.0, 0.0, 0.0], "VEC3");

@@ -50,6 +50,13 @@ fn references_lead_somewhere() {
     refuses("mesh 0 \"flame\"", "accessor 5", |f| primitive(f)["indices"] = json!(5));
     refuses("mesh 0", "material 1", |f| primitive(f)["material"] = json!(1));
     refuses("mesh 0", "invalid value", |f| primitive(f)["material"] = json!(-1));
+    refuses("node 0", "invalid value 4294967296", |f| {
+        f.json["nodes"][0]["mesh"] = json!(1u64 << 32);
+    });
+    refuses("mesh 0", "invalid value 4294967296", |f| {
+        primitive(f)["attributes"]["POSITION"] = json!(1u64 << 32);
+    });
+    refuses("mesh 0", "accessor 9", |f| primitive(f)["targets"] = json!([{"COLOR_0": 9}]));
     refuses("buffer view 1", "buffer 3", |f| f.json["bufferViews"][1]["buffer"] = json!(3));
     refuses("accessor 1", "buffer view 8", |f| f.json["accessors"][1]["bufferView"] = json!(8));
     refuses("material 0 \"glow\"", "texture 0", |f| {
@@ -164,11 +171,21 @@ fn arrays_have_the_types_of_their_uses() {
     refuses("accessor 0", "unknown component type", |f| {
         f.json["accessors"][0]["componentType"] = json!(5124);
     });
+    refuses("accessor 0", "unknown component type", |f| {
+        f.json["accessors"][0]["componentType"] = json!(5126 + (1u64 << 32));
+    });
     refuses("accessor 0", "normalised", |f| f.json["accessors"][0]["normalized"] = json!(true));
     refuses("mesh 0", "different numbers of vertices", |f| {
         let normals = f.floats(&[0.0, 0.0, 1.0], "VEC3");
         f.attribute("NORMAL", normals);
     });
+    for name in ["HEAT", "COLOUR", "TEXCOORD_00", "_HEAT"] {
+        refuses("mesh 0", "different numbers of vertices", |f| {
+            let short = f.floats(&[0.0], "SCALAR");
+            f.attribute("ODD", 0);
+            f.attribute(name, short);
+        });
+    }
     refuses("mesh 0", "index 3, but only 3", |f| f.data[40] = 3);
     refuses("mesh 0", "mode 9", |f| primitive(f)["mode"] = json!(9));
     refuses("mesh 0", "no primitives", |f| f.json["meshes"][0]["primitives"] = json!([]));

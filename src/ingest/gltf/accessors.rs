@@ -3,8 +3,13 @@
 //! Opening one proves that every byte it speaks of is there, so reading cannot fail.
 
 use super::buffers::Buffers;
-use super::document::{self, Document, label};
+use super::document::{Document, label};
 use crate::ingest::error::Fault;
+use gltf::json::accessor::sparse::Sparse;
+use gltf::json::accessor::{ComponentType, GenericComponentType, IndexComponentType, Type};
+use gltf::json::buffer::View;
+use gltf::json::validation::{Checked, USize64};
+use gltf::json::{Accessor as Row, Index};
 
 /// More elements than this do not exist without bytes behind them, in all sparse accessors of a
 /// file together.
@@ -12,8 +17,9 @@ const MOST_UNBACKED: usize = 1 << 26;
 
 /// An array whose every element is inside its buffer.
 pub(super) struct Accessor<'a> {
-    pub component: Component,
-    pub shape: Shape,
+    pub component: ComponentType,
+    pub shape: Type,
+    layout: Layout,
     pub count: usize,
     pub normalized: bool,
     /// Where the elements are; without, they are zero.
@@ -32,111 +38,57 @@ struct Overrides<'a> {
     values: &'a [u8],
 }
 
-/// The type of a component.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Component {
-    I8,
-    U8,
-    I16,
-    U16,
-    U32,
-    F32,
+/// Where the parts of an element are.
+#[derive(Clone, Copy)]
+struct Layout {
+    /// Components of a column; a vector is one column.
+    rows: usize,
+    component_bytes: usize,
+    /// From one column to the next: matrices align theirs to four bytes.
+    column_bytes: usize,
+    /// From one element to the next, if they are packed.
+    step: usize,
+    /// What belongs to an element: without the padding after its last column.
+    bytes: usize,
 }
 
-/// Rows and columns of an element; a vector is one column.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) struct Shape {
-    pub rows: usize,
-    pub columns: usize,
-}
-
-impl Component {
-    fn parse(code: u32) -> Option<Component> {
-        Some(match code {
-            5120 => Component::I8,
-            5121 => Component::U8,
-            5122 => Component::I16,
-            5123 => Component::U16,
-            5125 => Component::U32,
-            5126 => Component::F32,
-            _ => return None,
-        })
-    }
-
-    fn size(self) -> usize {
-        match self {
-            Component::I8 | Component::U8 => 1,
-            Component::I16 | Component::U16 => 2,
-            Component::U32 | Component::F32 => 4,
-        }
-    }
-
-    pub(super) fn is_unsigned(self) -> bool {
-        matches!(self, Component::U8 | Component::U16 | Component::U32)
-    }
-
-    /// The value as it is stored.
-    fn raw(self, bytes: &[u8]) -> f64 {
-        match (self, bytes) {
-            (Component::I8, &[a, ..]) => f64::from(a as i8),
-            (Component::U8, &[a, ..]) => f64::from(a),
-            (Component::I16, &[a, b, ..]) => f64::from(i16::from_le_bytes([a, b])),
-            (Component::U16, &[a, b, ..]) => f64::from(u16::from_le_bytes([a, b])),
-            (Component::U32, &[a, b, c, d, ..]) => f64::from(u32::from_le_bytes([a, b, c, d])),
-            (Component::F32, &[a, b, c, d, ..]) => f64::from(f32::from_le_bytes([a, b, c, d])),
-            _ => 0.0,
-        }
-    }
-
-    /// What a stored one means if normalised (glTF 2.0, 3.6.2.2).
-    fn largest(self) -> f64 {
-        match self {
-            Component::I8 => 127.0,
-            Component::U8 => 255.0,
-            Component::I16 => 32767.0,
-            Component::U16 => 65535.0,
-            Component::U32 | Component::F32 => 1.0,
-        }
+impl Layout {
+    fn of(component: ComponentType, shape: Type) -> Layout {
+        let (rows, columns) = match shape {
+            Type::Mat2 => (2, 2),
+            Type::Mat3 => (3, 3),
+            Type::Mat4 => (4, 4),
+            vector => (vector.multiplicity(), 1),
+        };
+        let component_bytes = component.size();
+        let tight = rows * component_bytes;
+        let column_bytes = if columns == 1 { tight } else { tight.next_multiple_of(4) };
+        let step = columns * column_bytes;
+        Layout { rows, component_bytes, column_bytes, step, bytes: step - column_bytes + tight }
     }
 }
 
-impl Shape {
-    pub(super) const SCALAR: Shape = Shape { rows: 1, columns: 1 };
-    pub(super) const VEC2: Shape = Shape { rows: 2, columns: 1 };
-    pub(super) const VEC3: Shape = Shape { rows: 3, columns: 1 };
-    pub(super) const VEC4: Shape = Shape { rows: 4, columns: 1 };
-
-    fn parse(name: &str) -> Option<Shape> {
-        Some(match name {
-            "SCALAR" => Shape::SCALAR,
-            "VEC2" => Shape::VEC2,
-            "VEC3" => Shape::VEC3,
-            "VEC4" => Shape::VEC4,
-            "MAT2" => Shape { rows: 2, columns: 2 },
-            "MAT3" => Shape { rows: 3, columns: 3 },
-            "MAT4" => Shape { rows: 4, columns: 4 },
-            _ => return None,
-        })
+/// A component as it is stored.
+fn raw(component: ComponentType, bytes: &[u8]) -> f64 {
+    match (component, bytes) {
+        (ComponentType::I8, &[a, ..]) => f64::from(a as i8),
+        (ComponentType::U8, &[a, ..]) => f64::from(a),
+        (ComponentType::I16, &[a, b, ..]) => f64::from(i16::from_le_bytes([a, b])),
+        (ComponentType::U16, &[a, b, ..]) => f64::from(u16::from_le_bytes([a, b])),
+        (ComponentType::U32, &[a, b, c, d, ..]) => f64::from(u32::from_le_bytes([a, b, c, d])),
+        (ComponentType::F32, &[a, b, c, d, ..]) => f64::from(f32::from_le_bytes([a, b, c, d])),
+        _ => 0.0,
     }
+}
 
-    pub(super) fn components(self) -> usize {
-        self.rows * self.columns
-    }
-
-    /// Bytes from one column to the next: matrices align theirs to four bytes.
-    fn column_bytes(self, component: Component) -> usize {
-        let tight = self.rows * component.size();
-        if self.columns == 1 { tight } else { tight.next_multiple_of(4) }
-    }
-
-    /// Bytes from one element to the next, if they are packed.
-    fn step(self, component: Component) -> usize {
-        self.columns * self.column_bytes(component)
-    }
-
-    /// Bytes that belong to an element: without the padding after its last column.
-    fn bytes(self, component: Component) -> usize {
-        (self.columns - 1) * self.column_bytes(component) + self.rows * component.size()
+/// What a stored one means if normalised (glTF 2.0, 3.6.2.2).
+fn largest(component: ComponentType) -> f64 {
+    match component {
+        ComponentType::I8 => 127.0,
+        ComponentType::U8 => 255.0,
+        ComponentType::I16 => 32767.0,
+        ComponentType::U16 => 65535.0,
+        ComponentType::U32 | ComponentType::F32 => 1.0,
     }
 }
 
@@ -147,7 +99,7 @@ impl<'a> Accessor<'a> {
         buffers: &'a Buffers<'a>,
     ) -> Result<Vec<Accessor<'a>>, Fault> {
         let mut unbacked = 0usize;
-        let open = |(i, row): (usize, &document::Accessor)| {
+        let open = |(i, row): (usize, &Row)| {
             let object = label("accessor", i, row.name.as_deref());
             let accessor = Accessor::open(document, buffers, row, &object)?;
             if accessor.base.is_none() && accessor.sparse.is_some() {
@@ -164,46 +116,40 @@ impl<'a> Accessor<'a> {
     fn open(
         document: &Document,
         buffers: &'a Buffers<'a>,
-        row: &document::Accessor,
+        row: &Row,
         object: &str,
     ) -> Result<Accessor<'a>, Fault> {
         let fault = |problem: String| Fault::new(object, problem);
-        let component = Component::parse(row.component_type)
-            .ok_or_else(|| fault(format!("has unknown component type {}", row.component_type)))?;
-        let shape = Shape::parse(&row.shape)
-            .ok_or_else(|| fault(format!("has unknown type {:?}", row.shape)))?;
-        if row.normalized && matches!(component, Component::F32 | Component::U32) {
+        let (Checked::Valid(GenericComponentType(component)), Checked::Valid(shape)) =
+            (row.component_type, row.type_)
+        else {
+            return Err(fault("has an unknown type".into()));
+        };
+        let layout = Layout::of(component, shape);
+        if row.normalized && matches!(component, ComponentType::F32 | ComponentType::U32) {
             return Err(fault("is normalised, which its component type cannot be".into()));
         }
         // Indices are 32 bits wide, so no more elements could be spoken of.
-        let count = u32::try_from(row.count)
+        let count = u32::try_from(row.count.0)
             .ok()
             .filter(|&count| count > 0)
-            .ok_or_else(|| fault(format!("has {} elements", row.count)))?
+            .ok_or_else(|| fault(format!("has {} elements", row.count.0)))?
             as usize;
         let base = match row.buffer_view {
-            Some(view) => Some(Strided::open(
-                document,
-                buffers,
-                row,
-                view,
-                count,
-                (component, shape),
-                object,
-            )?),
+            Some(view) => Some(Strided::open(document, buffers, row, view, count, layout, object)?),
             None if row.byte_offset.is_some() => {
                 return Err(fault("has an offset into no buffer view".into()));
             }
             None => None,
         };
-        let sparse = row
-            .sparse
-            .as_ref()
-            .map(|sparse| {
-                Overrides::open(document, buffers, sparse, count, (component, shape), object)
-            })
-            .transpose()?;
-        Ok(Accessor { component, shape, count, normalized: row.normalized, base, sparse })
+        let open = |sparse| Overrides::open(document, buffers, sparse, count, layout, object);
+        let sparse = row.sparse.as_ref().map(open).transpose()?;
+        let normalized = row.normalized;
+        Ok(Accessor { component, shape, layout, count, normalized, base, sparse })
+    }
+
+    pub(super) fn is_unsigned(&self) -> bool {
+        matches!(self.component, ComponentType::U8 | ComponentType::U16 | ComponentType::U32)
     }
 
     /// Whether there is data at all; without, every element is zero.
@@ -213,30 +159,29 @@ impl<'a> Accessor<'a> {
 
     /// Whether the elements are interleaved with others, as only vertex attributes may be.
     pub(super) fn is_interleaved(&self) -> bool {
-        let tight = self.shape.step(self.component);
-        self.base.as_ref().is_some_and(|base| base.stride != tight)
+        self.base.as_ref().is_some_and(|base| base.stride != self.layout.step)
     }
 
     /// The bytes of an element; none are zeros.
     fn element(&self, i: usize) -> &[u8] {
-        let size = self.shape.bytes(self.component);
+        let Layout { step, bytes: size, .. } = self.layout;
         if let Some(sparse) = &self.sparse
             && let Ok(at) = sparse.indices.binary_search(&(i as u32))
         {
-            return &sparse.values[at * self.shape.step(self.component)..][..size];
+            return &sparse.values[at * step..][..size];
         }
         self.base.as_ref().map_or(&[], |base| &base.bytes[i * base.stride..][..size])
     }
 
     /// Calls back with every component of every element as it is stored, and its number.
     pub(super) fn for_each_raw(&self, mut visit: impl FnMut(usize, f64)) {
-        let (step, column) = (self.component.size(), self.shape.column_bytes(self.component));
-        let offsets: Vec<usize> = (0..self.shape.components())
-            .map(|i| i / self.shape.rows * column + i % self.shape.rows * step)
+        let Layout { rows, component_bytes, column_bytes, .. } = self.layout;
+        let offsets: Vec<usize> = (0..self.shape.multiplicity())
+            .map(|i| i / rows * column_bytes + i % rows * component_bytes)
             .collect();
         for element in (0..self.count).map(|i| self.element(i)) {
             for (i, &offset) in offsets.iter().enumerate() {
-                visit(i, self.component.raw(element.get(offset..).unwrap_or(&[])));
+                visit(i, raw(self.component, element.get(offset..).unwrap_or(&[])));
             }
         }
     }
@@ -249,17 +194,17 @@ impl<'a> Accessor<'a> {
 
     /// One element of [`vectors`](Self::vectors).
     pub(super) fn vector<const N: usize>(&self, i: usize, missing: f32) -> [f32; N] {
-        let (step, rows) = (self.component.size(), self.shape.rows.min(N));
+        let (step, rows) = (self.layout.component_bytes, self.layout.rows.min(N));
         let mut vector = [missing; N];
         vector[..rows].fill(0.0);
         for (value, bytes) in vector[..rows].iter_mut().zip(self.element(i).chunks_exact(step)) {
             *value = match (self.component, bytes) {
-                (Component::F32, &[a, b, c, d]) => f32::from_le_bytes([a, b, c, d]),
+                (ComponentType::F32, &[a, b, c, d]) => f32::from_le_bytes([a, b, c, d]),
                 // The most negative integer means -1 too.
                 (component, bytes) if self.normalized => {
-                    (component.raw(bytes) / component.largest()).max(-1.0) as f32
+                    (raw(component, bytes) / largest(component)).max(-1.0) as f32
                 }
-                (component, bytes) => component.raw(bytes) as f32,
+                (component, bytes) => raw(component, bytes) as f32,
             };
         }
         vector
@@ -268,8 +213,8 @@ impl<'a> Accessor<'a> {
     /// An element as a vertex index.
     pub(super) fn index(&self, i: usize) -> u32 {
         match (self.component, self.element(i)) {
-            (Component::U32, &[a, b, c, d]) => u32::from_le_bytes([a, b, c, d]),
-            (component, element) => component.raw(element) as u32,
+            (ComponentType::U32, &[a, b, c, d]) => u32::from_le_bytes([a, b, c, d]),
+            (component, element) => raw(component, element) as u32,
         }
     }
 }
@@ -278,29 +223,27 @@ impl<'a> Strided<'a> {
     fn open(
         document: &Document,
         buffers: &'a Buffers<'a>,
-        row: &document::Accessor,
-        view: u32,
+        row: &Row,
+        view: Index<View>,
         count: usize,
-        (component, shape): (Component, Shape),
+        layout: Layout,
         object: &str,
     ) -> Result<Strided<'a>, Fault> {
         let fault = |problem: String| Fault::new(object, problem);
         let bytes = buffers.view(document, view, object)?;
-        let view_row = &document.buffer_views[view as usize];
-        let size = shape.bytes(component);
-        let stride = match view_row.byte_stride {
-            Some(stride) => usize::try_from(stride).unwrap_or(usize::MAX),
-            None => shape.step(component),
-        };
+        let view_row = &document.buffer_views[view.value()];
+        let size = layout.bytes;
+        let stride = view_row.byte_stride.map_or(layout.step, |stride| stride.0);
         if stride < size {
             return Err(fault(format!("its elements of {size} bytes overlap: stride {stride}")));
         }
-        let offset = row.byte_offset.unwrap_or(0);
-        let alignment = component.size() as u64;
+        let offset = row.byte_offset.unwrap_or_default().0;
+        let view_offset = view_row.byte_offset.unwrap_or_default().0;
+        let alignment = layout.component_bytes as u64;
         let aligned = offset.is_multiple_of(alignment)
-            && offset.wrapping_add(view_row.byte_offset).is_multiple_of(alignment)
+            && offset.wrapping_add(view_offset).is_multiple_of(alignment)
             && (stride as u64).is_multiple_of(alignment)
-            && (shape.columns == 1 || offset.is_multiple_of(4));
+            && (layout.step == layout.column_bytes || offset.is_multiple_of(4));
         if !aligned {
             return Err(fault("is not aligned to its component type".into()));
         }
@@ -310,7 +253,7 @@ impl<'a> Strided<'a> {
             .zip(extent)
             .and_then(|(start, extent)| bytes.get(start..start.checked_add(extent)?));
         let bytes = inside.ok_or_else(|| {
-            let room = view_row.byte_length;
+            let room = view_row.byte_length.0;
             fault(format!("its {count} elements do not fit the {room} bytes of buffer view {view}"))
         })?;
         Ok(Strided { bytes, stride })
@@ -321,39 +264,39 @@ impl<'a> Overrides<'a> {
     fn open(
         document: &Document,
         buffers: &'a Buffers<'a>,
-        sparse: &document::Sparse,
+        sparse: &Sparse,
         count: usize,
-        (component, shape): (Component, Shape),
+        layout: Layout,
         object: &str,
     ) -> Result<Overrides<'a>, Fault> {
         let fault = |problem: &str| Fault::new(object, format!("its sparse {problem}"));
-        let overridden = usize::try_from(sparse.count)
+        let overridden = usize::try_from(sparse.count.0)
             .ok()
             .filter(|&overridden| 0 < overridden && overridden <= count)
             .ok_or_else(|| fault("count is out of range"))?;
-        let packed = |view: u32, offset: u64, size: usize| {
+        let packed = |view: Index<View>, offset: USize64, size: usize| {
             let bytes = buffers.view(document, view, object)?;
-            if document.buffer_views[view as usize].byte_stride.is_some() {
+            if document.buffer_views[view.value()].byte_stride.is_some() {
                 return Err(fault("data has a stride"));
             }
-            let start = usize::try_from(offset).ok();
+            let start = usize::try_from(offset.0).ok();
             let end = start.zip(overridden.checked_mul(size)).and_then(|(a, b)| a.checked_add(b));
             let inside = start.zip(end).and_then(|(start, end)| bytes.get(start..end));
             inside.ok_or_else(|| fault("data does not fit its buffer view"))
         };
-        let kind = Component::parse(sparse.indices.component_type)
-            .filter(|kind| kind.is_unsigned())
-            .ok_or_else(|| fault("indices have a component type that indices cannot have"))?;
+        let Checked::Valid(IndexComponentType(kind)) = sparse.indices.component_type else {
+            return Err(fault("indices have a component type that indices cannot have"));
+        };
         let coded = packed(sparse.indices.buffer_view, sparse.indices.byte_offset, kind.size())?;
         let indices: Vec<u32> =
-            coded.chunks_exact(kind.size()).map(|bytes| kind.raw(bytes) as u32).collect();
+            coded.chunks_exact(kind.size()).map(|bytes| raw(kind, bytes) as u32).collect();
         if !indices.is_sorted_by(|a, b| a < b)
             || indices.last().is_some_and(|&i| i as usize >= count)
         {
             return Err(fault("indices do not ascend or are out of range"));
         }
-        let size = shape.step(component);
-        let values = packed(sparse.values.buffer_view, sparse.values.byte_offset, size)?;
+        let values = sparse.values.byte_offset;
+        let values = packed(sparse.values.buffer_view, values, layout.step)?;
         Ok(Overrides { indices, values })
     }
 }

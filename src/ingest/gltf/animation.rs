@@ -1,11 +1,14 @@
 //! Animations, merged: the file's clips are taken to run together, as one shot.
 
-use super::accessors::{Accessor, Component, Shape};
-use super::document::{AnimationSampler, Target, label};
+use super::accessors::Accessor;
+use super::document::{Target, label};
 use super::{Output, Source};
 use crate::ingest::error::Fault;
 use crate::scene::{Channel, Interpolation, Keys};
 use glam::{Quat, Vec3};
+use gltf::json::accessor::{ComponentType, Type};
+use gltf::json::animation::{Interpolation as RowInterpolation, Sampler};
+use gltf::json::validation::Checked;
 use std::collections::HashSet;
 
 /// The channels of every node of the file.
@@ -15,42 +18,42 @@ pub(super) fn compile(source: &Source, output: &mut Output) -> Result<Vec<Vec<Ch
     let mut moved = HashSet::new();
     for (i, animation) in document.animations.iter().enumerate() {
         let object = label("animation", i, animation.name.as_deref());
-        for row in &animation.channels {
-            let sampler = &animation.samplers[row.sampler as usize];
+        for row in &document.beside.channels[i] {
+            let sampler = &animation.samplers[row.sampler.value()];
             let Some((node, path)) = target(&row.target) else {
                 let (what, text) = unread(&row.target);
                 output.notes.add(format!("{object}, {what}"), text);
                 continue;
             };
-            let values = &source.accessors[sampler.output as usize];
-            let times = &source.accessors[sampler.input as usize];
-            let exists = document.nodes.get(node as usize).is_some_and(|n| n.matrix.is_none());
+            let values = &source.accessors[sampler.output.value()];
+            let times = &source.accessors[sampler.input.value()];
+            let exists = document.beside.transforms.get(node).is_some_and(|n| n.matrix.is_none());
             if !exists || !times.has_data() || !values.has_data() {
                 output.notes.add(object.clone(), "moves nothing that could move; left out");
                 continue;
             }
             if !moved.insert((node, path)) {
-                let node = label("node", node as usize, None);
+                let node = label("node", node, None);
                 output.notes.add(node, format!("only the first animation of its {path} is read"));
                 continue;
             }
             let bytes = (times.count + 4 * values.count) as u64 * 4;
             output.budget.take(bytes, || object.clone())?;
-            channels[node as usize].push(channel(path, sampler, times, values, &object)?);
+            channels[node].push(channel(path, sampler, times, values, &object)?);
         }
     }
     Ok(channels)
 }
 
 /// The node and the part of its transform that a channel moves, directly or by a pointer.
-fn target(target: &Target) -> Option<(u32, &'static str)> {
+fn target(target: &Target) -> Option<(usize, &'static str)> {
     let part = |name: &str| ["translation", "rotation", "scale"].into_iter().find(|p| *p == name);
     match &target.extensions.pointer {
         Some(pointer) => {
             let (node, path) = pointer.pointer.strip_prefix("/nodes/")?.split_once('/')?;
             Some((node.parse().ok()?, part(path)?))
         }
-        None => Some((target.node?, part(&target.path)?)),
+        None => Some((target.node?.value(), part(&target.path)?)),
     }
 }
 
@@ -75,20 +78,20 @@ fn unread(target: &Target) -> (&str, &'static str) {
 
 fn channel(
     path: &str,
-    sampler: &AnimationSampler,
+    sampler: &Sampler,
     times: &Accessor,
     values: &Accessor,
     object: &str,
 ) -> Result<Channel, Fault> {
-    let interpolation = match sampler.interpolation.as_str() {
-        "STEP" => Interpolation::Step,
-        "CUBICSPLINE" => Interpolation::Cubic,
+    let interpolation = match sampler.interpolation {
+        Checked::Valid(RowInterpolation::Step) => Interpolation::Step,
+        Checked::Valid(RowInterpolation::CubicSpline) => Interpolation::Cubic,
         _ => Interpolation::Linear,
     };
     // Validation has seen to this where the target is not a pointer.
     let in_a_key = if interpolation == Interpolation::Cubic { 3 } else { 1 };
-    let shape = if path == "rotation" { Shape::VEC4 } else { Shape::VEC3 };
-    let typed = values.component == Component::F32 || (values.normalized && path == "rotation");
+    let shape = if path == "rotation" { Type::Vec4 } else { Type::Vec3 };
+    let typed = values.component == ComponentType::F32 || (values.normalized && path == "rotation");
     if values.shape != shape || !typed || values.count != times.count * in_a_key {
         return Err(Fault::new(object, format!("its {path} values do not fit its keys")));
     }

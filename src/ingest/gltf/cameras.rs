@@ -1,27 +1,28 @@
 //! Cameras.
 
-use super::document::{Node, UsdCamera, reals};
+use super::document::{UsdCamera, reals};
 use super::{Output, Source};
 use crate::ingest::error::Fault;
 use crate::scene::Camera;
+use gltf::json::{Camera as Row, Index, Node};
 
 /// Adds the camera of a node.
 pub(super) fn compile(
     source: &Source,
     output: &mut Output,
-    camera: u32,
+    camera: Index<Row>,
     row: &Node,
     node: u32,
     object: &str,
 ) -> Result<(), Fault> {
-    let Some(lens) = &source.document.cameras[camera as usize].perspective else {
+    let Some(lens) = &source.document.cameras[camera.value()].perspective else {
         output.notes.add(object, "orthographic cameras are not read; left out");
         return Ok(());
     };
     let mut compiled = Camera {
         node,
-        yfov_rad: lens.yfov.f32(),
-        aspect: lens.aspect_ratio.map(|aspect| aspect.f32()),
+        yfov_rad: lens.yfov,
+        aspect: lens.aspect_ratio,
         lens_radius_m: 0.0,
         focus_distance_m: 0.0,
         film_offset: [0.0; 2],

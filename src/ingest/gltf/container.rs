@@ -1,4 +1,8 @@
 //! The bytes of a `.gltf` or `.glb` file: where its JSON is, and its binary chunk.
+//!
+//! Crate `gltf`'s `Glb` finds them too, but overflows on a length below 12, reads beyond the length
+//! that the header says, refuses unknown chunks, which are to be skipped, and does not look at what
+//! follows the second. Who checks all that has found the parts.
 
 use crate::ingest::error::Fault;
 use std::ops::Range;

@@ -1,13 +1,16 @@
 //! Mesh primitives, compiled to triangle meshes when the first node uses them.
 
 use super::accessors::Accessor;
-use super::document::{Primitive, label};
+use super::document::{label, morph_targets};
 use super::materials::{Materials, uv_sets};
 use super::{Output, Source};
 use crate::ingest::error::Fault;
 use crate::ingest::normals;
 use crate::scene::Mesh;
 use glam::{Vec2, Vec3, Vec4};
+use gltf::json::mesh::{Mode, Primitive, Semantic};
+use gltf::json::validation::Checked;
+use gltf::json::{Index, Mesh as Row};
 use std::rc::Rc;
 
 /// A texture set's number is its place in a list; honest files have two or three.
@@ -38,13 +41,13 @@ impl Meshes {
         &mut self,
         source: &Source,
         output: &mut Output,
-        number: u32,
+        number: Index<Row>,
     ) -> Result<Rc<[Option<u32>]>, Fault> {
-        if let Some(known) = &self.compiled[number as usize] {
+        if let Some(known) = &self.compiled[number.value()] {
             return Ok(known.clone());
         }
-        let row = &source.document.meshes[number as usize];
-        let object = label("mesh", number as usize, row.name.as_deref());
+        let row = &source.document.meshes[number.value()];
+        let object = label("mesh", number.value(), row.name.as_deref());
         let mut compiled = Vec::with_capacity(row.primitives.len());
         for (i, primitive) in row.primitives.iter().enumerate() {
             let object = match row.primitives.len() {
@@ -59,7 +62,7 @@ impl Meshes {
             }));
         }
         let compiled: Rc<[Option<u32>]> = compiled.into();
-        self.compiled[number as usize] = Some(compiled.clone());
+        self.compiled[number.value()] = Some(compiled.clone());
         Ok(compiled)
     }
 
@@ -68,9 +71,9 @@ impl Meshes {
         &mut self,
         source: &Source,
         output: &mut Output,
-        number: u32,
+        number: Index<Row>,
     ) -> Result<Option<u32>, Fault> {
-        let primitives = &source.document.meshes[number as usize].primitives;
+        let primitives = &source.document.meshes[number.value()].primitives;
         match primitives[0].material {
             Some(material) if primitives.iter().all(|p| p.material == Some(material)) => {
                 self.materials.index(source, output, material).map(Some)
@@ -86,35 +89,39 @@ impl Meshes {
         primitive: &Primitive,
         object: &str,
     ) -> Result<Option<Mesh>, Fault> {
-        let attribute = |semantic: &str| {
-            primitive.attributes.get(semantic).map(|&index| &source.accessors[index as usize])
+        let attribute = |semantic: Semantic| {
+            let index = primitive.attributes.get(&Checked::Valid(semantic))?;
+            Some(&source.accessors[index.value()])
         };
-        let Some(positions) = attribute("POSITION") else {
+        let Some(positions) = attribute(Semantic::Positions) else {
             output.notes.add(object, "has no positions; not drawn");
             return Ok(None);
         };
-        if primitive.mode < 4 {
+        let Checked::Valid(mode @ (Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan)) =
+            primitive.mode
+        else {
             output.notes.add(object, "is made of points or lines; not drawn");
             return Ok(None);
-        }
-        if !primitive.targets.is_empty() {
+        };
+        if morph_targets(primitive) > 0 {
             output.notes.add(object, "morph targets are not read; drawn in its rest shape");
         }
-        if attribute("JOINTS_0").is_some() {
+        if attribute(Semantic::Joints(0)).is_some() {
             output.notes.add(object, "skins are not read; drawn in its rest pose");
         }
-        if primitive.extensions.contains_key("KHR_materials_variants") {
+        let extensions = primitive.extensions.as_ref();
+        if extensions.is_some_and(|e| e.others.contains_key("KHR_materials_variants")) {
             output.notes.add(object, "material variants are not read; drawn with the default");
         }
-        let indices = primitive.indices.map(|index| &source.accessors[index as usize]);
+        let indices = primitive.indices.map(|index| &source.accessors[index.value()]);
         let corners = indices.map_or(positions.count, |indices| indices.count);
         let triangle_bytes = 12 * corners as u64;
         output.budget.take(triangle_bytes, || object.to_string())?;
-        if primitive.mode == 4 && !corners.is_multiple_of(3) {
+        if mode == Mode::Triangles && !corners.is_multiple_of(3) {
             output.notes.add(object, "its last triangle lacks corners; not drawn");
         }
         let corner = |i: usize| indices.map_or(i as u32, |indices| indices.index(i));
-        let mut triangles = triangles(primitive.mode, corners, corner);
+        let mut triangles = triangles(mode, corners, corner);
         if triangles.is_empty() {
             output.notes.add(object, "has no triangles; not drawn");
             return Ok(None);
@@ -138,11 +145,11 @@ impl Meshes {
             material,
             ..Mesh::default()
         };
-        if let Some(accessor) = attribute("NORMAL") {
+        if let Some(accessor) = attribute(Semantic::Normals) {
             mesh.normals = vertices.read(accessor, 0.0, Vec3::from_array);
             normals::make_unit(&mut mesh);
         }
-        if let Some(accessor) = attribute("TANGENT").filter(|_| wants_tangents) {
+        if let Some(accessor) = attribute(Semantic::Tangents).filter(|_| wants_tangents) {
             mesh.tangents = vertices.read(accessor, 1.0, unit_tangent);
             // A mesh with tangents of no length has none that mean anything.
             if mesh.tangents.iter().any(|tangent| !tangent.is_finite()) {
@@ -152,12 +159,12 @@ impl Meshes {
                 mesh.tangents.clear();
             }
         }
-        if let Some(accessor) = attribute("COLOR_0") {
+        if let Some(accessor) = attribute(Semantic::Colors(0)) {
             mesh.colors =
                 vertices.read(accessor, 1.0, |c| Vec4::from(c).clamp(Vec4::ZERO, Vec4::ONE));
         }
         for set in sets {
-            match attribute(&format!("TEXCOORD_{set}")).filter(|_| set < MOST_UV_SETS) {
+            match attribute(Semantic::TexCoords(set)).filter(|_| set < MOST_UV_SETS) {
                 Some(accessor) => {
                     mesh.uv_sets.resize_with(mesh.uv_sets.len().max(set as usize + 1), Vec::new);
                     mesh.uv_sets[set as usize] = vertices.read(accessor, 0.0, Vec2::from_array);
@@ -169,12 +176,12 @@ impl Meshes {
     }
 }
 
-/// Triangles of a list (4), strip (5) or fan (6), wound the same way (glTF 2.0, 3.7.2.1).
-fn triangles(mode: u32, corners: usize, corner: impl Fn(usize) -> u32) -> Vec<[u32; 3]> {
-    let count = if mode == 4 { corners / 3 } else { corners.saturating_sub(2) };
+/// Triangles of a list, strip or fan, wound the same way (glTF 2.0, 3.7.2.1).
+fn triangles(mode: Mode, corners: usize, corner: impl Fn(usize) -> u32) -> Vec<[u32; 3]> {
+    let count = if mode == Mode::Triangles { corners / 3 } else { corners.saturating_sub(2) };
     let triangle = |i: usize| match mode {
-        4 => [3 * i, 3 * i + 1, 3 * i + 2],
-        5 => [i, i + 1 + i % 2, i + 2 - i % 2],
+        Mode::Triangles => [3 * i, 3 * i + 1, 3 * i + 2],
+        Mode::TriangleStrip => [i, i + 1 + i % 2, i + 2 - i % 2],
         _ => [i + 1, i + 2, 0],
     };
     (0..count).map(|i| triangle(i).map(&corner)).collect()
@@ -225,10 +232,10 @@ mod tests {
     #[test]
     fn strips_and_fans_keep_their_winding() {
         let corner = |i: usize| i as u32;
-        assert_eq!(triangles(4, 7, corner), [[0, 1, 2], [3, 4, 5]]);
-        assert_eq!(triangles(5, 5, corner), [[0, 1, 2], [1, 3, 2], [2, 3, 4]]);
-        assert_eq!(triangles(6, 5, corner), [[1, 2, 0], [2, 3, 0], [3, 4, 0]]);
-        assert!(triangles(5, 1, corner).is_empty());
+        assert_eq!(triangles(Mode::Triangles, 7, corner), [[0, 1, 2], [3, 4, 5]]);
+        assert_eq!(triangles(Mode::TriangleStrip, 5, corner), [[0, 1, 2], [1, 3, 2], [2, 3, 4]]);
+        assert_eq!(triangles(Mode::TriangleFan, 5, corner), [[1, 2, 0], [2, 3, 0], [3, 4, 0]]);
+        assert!(triangles(Mode::TriangleStrip, 1, corner).is_empty());
     }
 
     #[test]

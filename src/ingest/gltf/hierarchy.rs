@@ -1,6 +1,6 @@
 //! Nodes, parents first, and what stands at them.
 
-use super::document::{Node as Row, UsdLux, label, usd_path};
+use super::document::{Real, Transform, UsdLux, label, usd_path};
 use super::geometry::Meshes;
 use super::lights::{self, Placed};
 use super::{Output, Source, animation, cameras, instancing};
@@ -8,13 +8,14 @@ use crate::ingest::error::Fault;
 use crate::ingest::paths::{PrimPaths, component};
 use crate::scene::{Channel, Instance, Node, Shaping, Trs};
 use glam::{DAffine3, DMat4, DQuat, DVec3};
+use gltf::json::{Index, Mesh, Node as Row};
 
 /// How far a scale may be from uniform for a sphere to stay a sphere.
 const UNIFORM_TOLERANCE: f64 = 1e-4;
 
 /// A node of the file that is to be compiled.
 struct Open {
-    row: u32,
+    row: usize,
     parent: Option<u32>,
     visible: bool,
 }
@@ -40,40 +41,42 @@ pub(super) fn compile(source: &Source, output: &mut Output) -> Result<(), Fault>
     };
     // A stack, so that no depth of the hierarchy is a depth of calls.
     let roots = roots(source, output);
-    let open = |row: u32, parent, visible| Open { row, parent, visible };
+    let open = |row: usize, parent, visible| Open { row, parent, visible };
     let mut stack: Vec<Open> = roots.into_iter().rev().map(|row| open(row, None, true)).collect();
     while let Some(Open { row: number, parent, visible }) = stack.pop() {
-        let row = &source.document.nodes[number as usize];
-        let visible = visible && row.extensions.visibility.as_ref().is_none_or(|v| v.visible);
+        let row = &source.document.nodes[number];
+        let visible = visible && !source.document.beside.hidden.contains(&number);
         let node = walk.place(output, number, row, parent)?;
         if visible {
             walk.furnish(output, number, row, node)?;
-        } else if row.mesh.is_some() || row.extensions.light.is_some() {
-            let object = label("node", number as usize, row.name.as_deref());
+        } else if row.mesh.is_some() || source.document.light_at(number).is_some() {
+            let object = label("node", number, row.name.as_deref());
             output.notes.add(object, "is hidden (KHR_node_visibility); left out");
         }
-        stack.extend(row.children.iter().rev().map(|&child| open(child, Some(node), visible)));
+        let children = row.children.iter().flatten().rev();
+        stack.extend(children.map(|child| open(child.value(), Some(node), visible)));
     }
     Ok(())
 }
 
 /// The roots of the default scene, else of the first, else all.
-fn roots(source: &Source, output: &mut Output) -> Vec<u32> {
+fn roots(source: &Source, output: &mut Output) -> Vec<usize> {
     let document = source.document;
-    match document.scenes.get(document.scene.unwrap_or(0) as usize) {
+    let default = document.scene.map_or(0, |scene| scene.value());
+    match document.scenes.get(default) {
         Some(scene) => {
             if document.scenes.len() > 1 {
-                let object = format!("scene {}", document.scene.unwrap_or(0));
+                let object = format!("scene {default}");
                 output.notes.add(object, "only this one of the file's scenes is read");
             }
-            scene.nodes.clone()
+            scene.nodes.iter().map(Index::value).collect()
         }
         None => {
             let mut is_root = vec![true; document.nodes.len()];
-            for &child in document.nodes.iter().flat_map(|node| &node.children) {
-                is_root[child as usize] = false;
+            for child in document.nodes.iter().flat_map(|node| node.children.iter().flatten()) {
+                is_root[child.value()] = false;
             }
-            (0..is_root.len() as u32).filter(|&i| is_root[i as usize]).collect()
+            (0..is_root.len()).filter(|&i| is_root[i]).collect()
         }
     }
 }
@@ -83,20 +86,28 @@ impl Walk<'_> {
     fn place(
         &mut self,
         output: &mut Output,
-        number: u32,
+        number: usize,
         row: &Row,
         parent: Option<u32>,
     ) -> Result<u32, Fault> {
         let path = match usd_path(&row.extras) {
-            Some(path) => path.to_string(),
+            Some(path) => path,
             None => {
                 let above = parent.map_or("", |parent| &output.scene.nodes[parent as usize].path);
                 let name = row.name.as_deref().unwrap_or_default();
                 format!("{above}/{}", component(name, || format!("node_{number}")))
             }
         };
-        let channels = std::mem::take(&mut self.channels[number as usize]);
-        self.push(output, Node { path, parent, local: local(row), channels })
+        let channels = std::mem::take(&mut self.channels[number]);
+        self.push(
+            output,
+            Node {
+                path,
+                parent,
+                local: local(&self.source.document.beside.transforms[number]),
+                channels,
+            },
+        )
     }
 
     fn push(&mut self, output: &mut Output, mut node: Node) -> Result<u32, Fault> {
@@ -113,28 +124,29 @@ impl Walk<'_> {
     fn furnish(
         &mut self,
         output: &mut Output,
-        number: u32,
+        number: usize,
         row: &Row,
         node: u32,
     ) -> Result<(), Fault> {
-        let object = label("node", number as usize, row.name.as_deref());
+        let object = label("node", number, row.name.as_deref());
         if let Some(camera) = row.camera {
             cameras::compile(self.source, output, camera, row, node, &object)?;
         }
         let lux = UsdLux::of(&row.extras, &object)?;
-        let light = lights::of_node(self.source, output, row, lux.as_ref(), node, &object)?;
+        let light = lights::of_node(self.source, output, number, lux.as_ref(), node, &object)?;
         let has_light = light.is_some();
         output.scene.lights.extend(light);
         let shaping = lights::shaping(lux.as_ref(), &object)?;
         let forced = lux.as_ref().is_some_and(|lux| lux.force);
+        let instances = self.source.document.beside.instances.get(&number);
         let Some(mesh) = row.mesh else {
-            if row.extensions.instancing.is_some() {
+            if instances.is_some() {
                 output.notes.add(object, "has instances, but no mesh; left out");
             }
             return Ok(());
         };
         let placed = Placed { lux: lux.as_ref(), shaping, forced, has_light, object: &object };
-        let Some(instances) = &row.extensions.instancing else {
+        let Some(instances) = instances else {
             return self.put_mesh(output, mesh, node, &placed);
         };
         for (i, local) in
@@ -152,7 +164,7 @@ impl Walk<'_> {
     fn put_mesh(
         &mut self,
         output: &mut Output,
-        mesh: u32,
+        mesh: Index<Mesh>,
         node: u32,
         placed: &Placed,
     ) -> Result<(), Fault> {
@@ -172,12 +184,13 @@ impl Walk<'_> {
             );
         }
         let compiled = self.meshes.primitives(self.source, output, mesh)?;
-        let row = &self.source.document.meshes[mesh as usize];
+        let row = &self.source.document.meshes[mesh.value()];
         for (i, &compiled) in compiled.iter().enumerate() {
             let Some(compiled) = compiled else { continue };
             let above = output.scene.nodes[node as usize].path.clone();
             // A lone mesh is the node's prim; several, or one beside a light, are below it.
-            let own = usd_path(&row.primitives[i].extras).and_then(|path| path.rsplit('/').next());
+            let own = usd_path(&row.primitives[i].extras);
+            let own = own.as_deref().and_then(|path| path.rsplit('/').next());
             let path = match own {
                 Some(own) => self.paths.claim(format!("{above}/{own}")),
                 None if row.primitives.len() > 1 => self.paths.claim(format!("{above}/prim_{i}")),
@@ -193,12 +206,12 @@ impl Walk<'_> {
     }
 }
 
-fn local(row: &Row) -> Trs {
+fn local(row: &Transform) -> Trs {
     if let Some(matrix) = row.matrix {
         let columns = matrix.map(|value| value.f64());
         return Trs::Matrix(DAffine3::from_mat4(DMat4::from_cols_array(&columns)));
     }
-    let vector = |values: [super::document::Real; 3]| DVec3::from(values.map(|value| value.f64()));
+    let vector = |values: [Real; 3]| DVec3::from(values.map(|value| value.f64()));
     let rotation = row.rotation.map(|parts| DQuat::from_array(parts.map(|part| part.f64())));
     Trs::Parts {
         translation: row.translation.map_or(DVec3::ZERO, vector),

@@ -14,11 +14,11 @@ pub(super) fn transforms(
     object: &str,
 ) -> Result<Vec<Trs>, Fault> {
     let attribute = |semantic: &str| {
-        instancing.attributes.get(semantic).map(|&index| &source.accessors[index as usize])
+        instancing.attributes.get(semantic).map(|&index| &source.accessors[index.value()])
     };
     // Validation has seen that there is an attribute and that all are of one length.
     let first = instancing.attributes.values().next();
-    let count = first.map_or(0, |&index| source.accessors[index as usize].count);
+    let count = first.map_or(0, |&index| source.accessors[index.value()].count);
     output.budget.take((count * size_of::<Trs>()) as u64, || object.to_string())?;
     let (translations, rotations, scales) =
         (attribute("TRANSLATION"), attribute("ROTATION"), attribute("SCALE"));

@@ -1,11 +1,13 @@
 //! Lights that are not meshes: `KHR_lights_punctual`, and what `extras.usdLux` adds.
 
-use super::document::{Light as Row, Node, UsdLux, reals};
+use super::document::{UsdLux, reals};
 use super::{Output, Source};
 use crate::ingest::error::Fault;
 use crate::ingest::image::{self, Coding};
 use crate::math::color::Rgb;
 use crate::scene::{Light, LightKind, Material, Shaping, Texture, Wrap};
+use gltf::json::extensions::scene::khr_lights_punctual::{Light as Row, Type};
+use gltf::json::validation::Checked;
 
 /// What a node says of the meshes at it.
 #[derive(Clone, Copy)]
@@ -37,7 +39,7 @@ impl Placed<'_> {
 pub(super) fn of_node(
     source: &Source,
     output: &mut Output,
-    row: &Node,
+    number: usize,
     lux: Option<&UsdLux>,
     node: u32,
     object: &str,
@@ -50,36 +52,36 @@ pub(super) fn of_node(
     if let Some(lux) = lux.filter(|lux| lux.kind == "DomeLight") {
         return Ok(light(dome(source, output, lux, object)?, None));
     }
-    let Some(punctual) = &row.extensions.light else {
-        if let Some(lux) = lux.filter(|_| row.mesh.is_none()) {
+    let Some(punctual) = source.document.light_at(number) else {
+        if let Some(lux) = lux.filter(|_| source.document.nodes[number].mesh.is_none()) {
             output.notes.add(object, format!("a {} has no carrier in glTF; left out", lux.kind));
         }
         return Ok(None);
     };
-    let punctual = &source.document.lights[punctual.light as usize];
+    let punctual = &source.document.lights()[punctual.value()];
     let kind = match shaping(lux, object)? {
-        Some(shaping) if punctual.kind != "directional" => {
+        Some(shaping) if punctual.type_ != Checked::Valid(Type::Directional) => {
             LightKind::Spot { intensity_cd: strength(punctual, object)?, shaping }
         }
         _ => punctual_kind(punctual, lux, object)?,
     };
     let is_distant = matches!(kind, LightKind::Distant { .. });
-    let range_m = punctual.range.filter(|_| !is_distant).map(|range| range.f32());
+    let range_m = punctual.range.filter(|_| !is_distant);
     Ok(light(kind, range_m))
 }
 
 fn punctual_kind(row: &Row, lux: Option<&UsdLux>, object: &str) -> Result<LightKind, Fault> {
     let strength = strength(row, object)?;
-    Ok(match (row.kind.as_str(), &row.spot) {
-        ("directional", _) => {
+    Ok(match (row.type_, &row.spot) {
+        (Checked::Valid(Type::Directional), _) => {
             let angle = lux.and_then(|lux| lux.angle).map_or(0.0, |angle| angle.f32());
             if !(0.0..=360.0).contains(&angle) {
                 return Err(Fault::new(object, "extras.usdLux: angle is not in [0, 360]"));
             }
             LightKind::Distant { irradiance_lux: strength, angle_rad: angle.to_radians() }
         }
-        ("spot", Some(spot)) => {
-            let (inner, outer) = (spot.inner_cone_angle.f32(), spot.outer_cone_angle.f32());
+        (Checked::Valid(Type::Spot), Some(spot)) => {
+            let (inner, outer) = (spot.inner_cone_angle, spot.outer_cone_angle);
             let outer_rad = outer.min(std::f32::consts::FRAC_PI_2);
             let shaping = Shaping::Khr { inner_rad: inner.min(outer_rad), outer_rad };
             LightKind::Spot { intensity_cd: strength, shaping }
@@ -89,7 +91,7 @@ fn punctual_kind(row: &Row, lux: Option<&UsdLux>, object: &str) -> Result<LightK
 }
 
 fn strength(row: &Row, object: &str) -> Result<Rgb, Fault> {
-    let strength = Rgb::from(reals(row.color)) * row.intensity.f32();
+    let strength = Rgb::from(row.color) * row.intensity;
     match strength.is_finite() {
         true => Ok(strength),
         false => Err(Fault::new(object, "its light is too strong for a 32-bit number")),

@@ -1,12 +1,17 @@
 //! Materials, compiled when the first mesh uses them.
 
-use super::document::{self, Material as Row, SpecularGlossiness, TextureInfo, label, reals};
+use super::document::label;
 use super::textures::Textures;
 use super::{Output, Source};
 use crate::ingest::error::Fault;
 use crate::ingest::image::Coding;
 use crate::math::color::Rgb;
 use crate::scene::{AlphaMode, Material, TextureUse};
+use gltf::json::extensions::material::PbrSpecularGlossiness;
+use gltf::json::material::AlphaMode as RowAlphaMode;
+use gltf::json::texture::Info;
+use gltf::json::validation::Checked;
+use gltf::json::{Index, Material as Row};
 
 /// Reflectance at normal incidence of the default dielectric: index of refraction 1.5.
 const DEFAULT_REFLECTANCE: f32 = 0.04;
@@ -28,17 +33,17 @@ impl Materials {
         &mut self,
         source: &Source,
         output: &mut Output,
-        number: u32,
+        number: Index<Row>,
     ) -> Result<u32, Fault> {
-        if let Some(known) = self.compiled[number as usize] {
+        if let Some(known) = self.compiled[number.value()] {
             return Ok(known);
         }
-        let row = &source.document.materials[number as usize];
-        let object = label("material", number as usize, row.name.as_deref());
-        let material = self.compile(source, output, row, object)?;
+        let row = &source.document.materials[number.value()];
+        let object = label("material", number.value(), row.name.as_deref());
+        let material = self.compile(source, output, number.value(), object)?;
         output.scene.materials.push(material);
         let index = output.scene.materials.len() as u32 - 1;
-        self.compiled[number as usize] = Some(index);
+        self.compiled[number.value()] = Some(index);
         Ok(index)
     }
 
@@ -46,21 +51,23 @@ impl Materials {
         &mut self,
         source: &Source,
         output: &mut Output,
-        row: &Row,
+        number: usize,
         object: String,
     ) -> Result<Material, Fault> {
-        let mut texture = |info: &Option<TextureInfo>, coding| -> Result<_, Fault> {
+        let row = &source.document.materials[number];
+        let mut texture = |info: &Option<Info>, coding| -> Result<_, Fault> {
             match info {
                 Some(info) => self.textures.texture_use(source, output, info, coding),
                 None => Ok(None),
             }
         };
         let pbr = &row.pbr_metallic_roughness;
-        let extensions = &row.extensions;
-        let [red, green, blue, opacity] = reals(pbr.base_color_factor);
+        let none = Default::default();
+        let extensions = row.extensions.as_ref().unwrap_or(&none);
+        let [red, green, blue, opacity] = pbr.base_color_factor.0;
         let strength = extensions.emissive_strength.as_ref();
-        let strength = strength.map_or(1.0, |strength| strength.emissive_strength.f32());
-        let emission = Rgb::from(reals(row.emissive_factor)) * strength;
+        let strength = strength.map_or(1.0, |strength| strength.emissive_strength.0);
+        let emission = Rgb::from(row.emissive_factor.0) * strength;
         if !emission.is_finite() {
             return Err(Fault::new(object, "its emission is too strong for a 32-bit number"));
         }
@@ -70,16 +77,18 @@ impl Materials {
             base_color_texture: None,
             opacity,
             alpha_mode: match row.alpha_mode {
-                document::AlphaMode::Opaque => AlphaMode::Opaque,
-                document::AlphaMode::Mask => AlphaMode::Mask(row.alpha_cutoff.f32()),
-                document::AlphaMode::Blend => AlphaMode::Blend,
+                Checked::Valid(RowAlphaMode::Mask) => {
+                    AlphaMode::Mask(row.alpha_cutoff.unwrap_or_default().0)
+                }
+                Checked::Valid(RowAlphaMode::Blend) => AlphaMode::Blend,
+                _ => AlphaMode::Opaque,
             },
-            metallic: pbr.metallic_factor.f32(),
-            roughness: pbr.roughness_factor.f32(),
+            metallic: pbr.metallic_factor.0,
+            roughness: pbr.roughness_factor.0,
             emission_nits: emission,
             double_sided: row.double_sided,
-            normal_texture: texture(&row.normal_texture, Coding::Linear)?,
-            normal_scale: row.normal_texture.as_ref().map_or(1.0, |info| info.scale.f32()),
+            normal_texture: texture(&source.document.beside.normal_maps[number], Coding::Linear)?,
+            normal_scale: row.normal_texture.as_ref().map_or(1.0, |map| map.scale),
             ..Material::default()
         };
         // A texture that nothing of is left of is not decoded.
@@ -87,18 +96,18 @@ impl Materials {
             material.emission_texture = texture(&row.emissive_texture, Coding::Srgb)?;
         }
         if let Some(ior) = &extensions.ior {
-            material.ior = ior.ior.f32();
+            material.ior = ior.ior.0;
         }
         if let Some(specular) = &extensions.specular {
-            material.specular = specular.specular_factor.f32();
-            material.specular_color = Rgb::from(reals(specular.specular_color_factor));
+            material.specular = specular.specular_factor.0;
+            material.specular_color = Rgb::from(specular.specular_color_factor.0);
             if material.specular > 0.0 {
                 material.specular_texture = texture(&specular.specular_texture, Coding::Linear)?;
                 material.specular_color_texture =
                     texture(&specular.specular_color_texture, Coding::Srgb)?;
             }
         }
-        if let Some(glossy) = &extensions.specular_glossiness {
+        if let Some(glossy) = &extensions.pbr_specular_glossiness {
             material.base_color_texture = texture(&glossy.diffuse_texture, Coding::Srgb)?;
             approximate_glossiness(&mut material, glossy);
             output.notes.add(
@@ -122,13 +131,13 @@ impl Materials {
 }
 
 /// A dielectric of the same diffuse colour, roughness and reflectance.
-fn approximate_glossiness(material: &mut Material, glossy: &SpecularGlossiness) {
-    let [red, green, blue, opacity] = reals(glossy.diffuse_factor);
+fn approximate_glossiness(material: &mut Material, glossy: &PbrSpecularGlossiness) {
+    let [red, green, blue, opacity] = glossy.diffuse_factor.0;
     material.base_color = Rgb::new(red, green, blue);
     material.opacity = opacity;
     material.metallic = 0.0;
-    material.roughness = 1.0 - glossy.glossiness_factor.f32();
-    material.specular_color = Rgb::from(reals(glossy.specular_factor)) / DEFAULT_REFLECTANCE;
+    material.roughness = 1.0 - glossy.glossiness_factor.0;
+    material.specular_color = Rgb::from(glossy.specular_factor.0) / DEFAULT_REFLECTANCE;
 }
 
 /// The texture sets that a material's textures are looked up by.

@@ -1,11 +1,14 @@
 //! Textures: images with a sampling rule, decoded when the first material uses them.
 
-use super::document::{Image, TextureInfo, label};
+use super::document::{label, source as image_of};
 use super::{Output, Source};
 use crate::ingest::error::Fault;
 use crate::ingest::image::{self, Coding};
 use crate::scene::{Texture, TextureUse, Wrap};
 use glam::{Affine2, Mat2, Vec2};
+use gltf::json::texture::{Info, MagFilter, WrappingMode};
+use gltf::json::validation::Checked;
+use gltf::json::{Image, Index};
 use std::borrow::Cow;
 use std::collections::{HashMap, HashSet};
 
@@ -16,9 +19,9 @@ type Rule = ([Wrap; 2], bool, Coding);
 #[derive(Default)]
 pub(super) struct Textures {
     /// By image; few rules exist.
-    compiled: HashMap<u32, Vec<(Rule, u32)>>,
+    compiled: HashMap<Index<Image>, Vec<(Rule, u32)>>,
     /// Images that cannot be read and were noted.
-    unread: HashSet<u32>,
+    unread: HashSet<Index<Image>>,
 }
 
 /// Every image leads to something inside the scene's folder, whether it is used or not.
@@ -40,32 +43,32 @@ impl Textures {
         &mut self,
         source: &Source,
         output: &mut Output,
-        info: &TextureInfo,
+        info: &Info,
         coding: Coding,
     ) -> Result<Option<TextureUse>, Fault> {
-        let row = &source.document.textures[info.index as usize];
-        let Some(image) = row.source else {
-            let object = label("texture", info.index as usize, row.name.as_deref());
+        let row = &source.document.textures[info.index.value()];
+        let Some(image) = image_of(row) else {
+            let object = label("texture", info.index.value(), row.name.as_deref());
             output.notes.add(object, "has no image that can be read; drawn without");
             return Ok(None);
         };
-        let sampler = row.sampler.map(|sampler| &source.document.samplers[sampler as usize]);
-        let wrap = [sampler.and_then(|s| s.wrap_s), sampler.and_then(|s| s.wrap_t)].map(wrap);
-        const NEAREST: u32 = 9728;
-        let bilinear = sampler.and_then(|s| s.mag_filter) != Some(NEAREST);
+        let sampler = row.sampler.map(|sampler| &source.document.samplers[sampler.value()]);
+        let wrap = sampler.map_or([Wrap::Repeat; 2], |s| [s.wrap_s, s.wrap_t].map(wrap));
+        let nearest = Some(Checked::Valid(MagFilter::Nearest));
+        let bilinear = sampler.and_then(|s| s.mag_filter) != nearest;
         let Some(texture) = self.texture(source, output, image, (wrap, bilinear, coding))? else {
             return Ok(None);
         };
-        let transform = info.extensions.transform.as_ref();
+        let extensions = info.extensions.as_ref();
+        let transform = extensions.and_then(|extensions| extensions.texture_transform.as_ref());
         let uv_set = transform.and_then(|transform| transform.tex_coord).unwrap_or(info.tex_coord);
         let transform = transform.map(|transform| {
-            let scale = transform.scale.map(|value| value.f32());
-            let (sin, cos) = transform.rotation.f32().sin_cos();
+            let (sin, cos) = transform.rotation.0.sin_cos();
             // v points down, so counter-clockwise is this way round.
             let rotation = Mat2::from_cols(Vec2::new(cos, -sin), Vec2::new(sin, cos));
             Affine2 {
-                matrix2: rotation * Mat2::from_diagonal(scale.into()),
-                translation: transform.offset.map(|value| value.f32()).into(),
+                matrix2: rotation * Mat2::from_diagonal(transform.scale.0.into()),
+                translation: transform.offset.0.into(),
             }
         });
         Ok(Some(TextureUse { texture, uv_set, transform }))
@@ -75,7 +78,7 @@ impl Textures {
         &mut self,
         source: &Source,
         output: &mut Output,
-        image: u32,
+        image: Index<Image>,
         rule: Rule,
     ) -> Result<Option<u32>, Fault> {
         let known = self.compiled.get(&image).into_iter().flatten();
@@ -85,8 +88,8 @@ impl Textures {
         if self.unread.contains(&image) {
             return Ok(None);
         }
-        let row = &source.document.images[image as usize];
-        let object = label("image", image as usize, row.name.as_deref());
+        let row = &source.document.images[image.value()];
+        let object = label("image", image.value(), row.name.as_deref());
         let bytes = bytes(source, row, &object)?;
         if !image::is_surface_format(&bytes) {
             output.notes.add(object, "is neither PNG nor JPEG; drawn without");
@@ -113,10 +116,10 @@ fn bytes<'a>(source: &'a Source, row: &Image, object: &str) -> Result<Cow<'a, [u
     }
 }
 
-fn wrap(code: Option<u32>) -> Wrap {
-    match code {
-        Some(33071) => Wrap::Clamp,
-        Some(33648) => Wrap::Mirror,
+fn wrap(mode: Checked<WrappingMode>) -> Wrap {
+    match mode {
+        Checked::Valid(WrappingMode::ClampToEdge) => Wrap::Clamp,
+        Checked::Valid(WrappingMode::MirroredRepeat) => Wrap::Mirror,
         _ => Wrap::Repeat,
     }
 }

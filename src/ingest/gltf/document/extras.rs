@@ -1,10 +1,12 @@
 //! What `extras` carry for Candelabra; see `carriers.md`.
 
-use super::{Real, typed};
+use super::Real;
 use crate::ingest::error::Fault;
+use gltf::json::Extras;
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
-use serde_json::Value;
+use serde_json::value::RawValue;
+use std::collections::HashMap;
 
 /// `asset.extras.usd`: the clock of the stage.
 #[derive(Deserialize)]
@@ -57,14 +59,14 @@ pub(in crate::ingest::gltf) struct UsdShaping {
 }
 
 impl AssetUsd {
-    pub(in crate::ingest::gltf) fn of(extras: &Value) -> Result<Option<AssetUsd>, Fault> {
+    pub(in crate::ingest::gltf) fn of(extras: &Extras) -> Result<Option<AssetUsd>, Fault> {
         member(extras, "usd", "asset")
     }
 }
 
 impl UsdCamera {
     pub(in crate::ingest::gltf) fn of(
-        extras: &Value,
+        extras: &Extras,
         object: &str,
     ) -> Result<Option<UsdCamera>, Fault> {
         member(extras, "usdCamera", object)
@@ -73,7 +75,7 @@ impl UsdCamera {
 
 impl UsdLux {
     pub(in crate::ingest::gltf) fn of(
-        extras: &Value,
+        extras: &Extras,
         object: &str,
     ) -> Result<Option<UsdLux>, Fault> {
         member(extras, "usdLux", object)
@@ -81,17 +83,22 @@ impl UsdLux {
 }
 
 /// `extras.usdPath`, if it is an absolute path; anything else is some other program's.
-pub(in crate::ingest::gltf) fn usd_path(extras: &Value) -> Option<&str> {
-    extras.get("usdPath")?.as_str().filter(|path| path.starts_with('/') && path.len() > 1)
+pub(in crate::ingest::gltf) fn usd_path(extras: &Extras) -> Option<String> {
+    let path: String = serde_json::from_str(raw(extras, "usdPath")?).ok()?;
+    Some(path).filter(|path| path.starts_with('/') && path.len() > 1)
 }
 
 fn member<T: DeserializeOwned>(
-    extras: &Value,
+    extras: &Extras,
     key: &str,
     object: &str,
 ) -> Result<Option<T>, Fault> {
-    match extras.get(key) {
-        Some(value) => typed(value.clone(), &format!("{object}, extras.{key}")).map(Some),
-        None => Ok(None),
-    }
+    let value = raw(extras, key).map(serde_json::from_str).transpose();
+    value.map_err(|error| Fault::new(format!("{object}, extras.{key}"), error))
+}
+
+/// The text of a member; extras that are no object have none.
+fn raw<'a>(extras: &'a Extras, key: &str) -> Option<&'a str> {
+    let members: HashMap<String, &RawValue> = serde_json::from_str(extras.as_ref()?.get()).ok()?;
+    Some(members.get(key)?.get())
 }

@@ -32,27 +32,3 @@ impl Real {
 pub(in crate::ingest::gltf) fn reals<const N: usize>(values: [Real; N]) -> [f32; N] {
     values.map(Real::f32)
 }
-
-pub(super) fn one() -> Real {
-    Real(1.0)
-}
-
-pub(super) fn half() -> Real {
-    Real(0.5)
-}
-
-pub(super) fn eighth_turn() -> Real {
-    Real(std::f64::consts::FRAC_PI_4)
-}
-
-pub(super) fn default_ior() -> Real {
-    Real(1.5)
-}
-
-pub(super) fn white() -> [Real; 3] {
-    [Real(1.0); 3]
-}
-
-pub(super) fn opaque_white() -> [Real; 4] {
-    [Real(1.0); 4]
-}

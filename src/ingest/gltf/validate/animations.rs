@@ -2,8 +2,11 @@
 
 use super::data::Facts;
 use crate::ingest::error::Fault;
-use crate::ingest::gltf::accessors::{Accessor, Component, Shape};
-use crate::ingest::gltf::document::{Animation, Channel, Document, label};
+use crate::ingest::gltf::accessors::Accessor;
+use crate::ingest::gltf::document::{Channel, Document, label, morph_targets};
+use gltf::json::accessor::{ComponentType, Type};
+use gltf::json::animation::{Interpolation, Sampler};
+use gltf::json::validation::Checked;
 use std::collections::HashSet;
 
 /// How far the length of a key's quaternion may be from one; more for coarse integers.
@@ -20,22 +23,22 @@ pub(super) fn check(
     for (i, animation) in document.animations.iter().enumerate() {
         let fault = |problem| Fault::new(label("animation", i, animation.name.as_deref()), problem);
         for sampler in &animation.samplers {
-            let input = &document.accessors[sampler.input as usize];
+            let input = &document.accessors[sampler.input.value()];
             if input.min.is_none() || input.max.is_none() {
                 return Err(fault("its key times have no min and max".into()));
             }
-            check_times(&accessors[sampler.input as usize], &facts[sampler.input as usize])
-                .map_err(fault)?;
+            let input = sampler.input.value();
+            check_times(&accessors[input], &facts[input]).map_err(fault)?;
         }
         let mut targets = HashSet::new();
-        for channel in &animation.channels {
+        for channel in &document.beside.channels[i] {
+            let sampler = &animation.samplers[channel.sampler.value()];
             check_target(channel, document).map_err(fault)?;
-            check_values(channel, animation, document, accessors).map_err(fault)?;
-            let sampler = &animation.samplers[channel.sampler as usize];
-            let (values, cubic) = (sampler.output, sampler.interpolation == "CUBICSPLINE");
+            check_values(channel, sampler, document, accessors).map_err(fault)?;
+            let (values, cubic) = (sampler.output.value(), is_cubic(sampler));
             if channel.target.path == "rotation"
                 && rotations.insert((values, cubic))
-                && !quaternions_are_unit(&accessors[values as usize], cubic)
+                && !quaternions_are_unit(&accessors[values], cubic)
             {
                 return Err(fault("has a rotation that is not a unit quaternion".into()));
             }
@@ -50,8 +53,12 @@ pub(super) fn check(
     Ok(())
 }
 
+fn is_cubic(sampler: &Sampler) -> bool {
+    sampler.interpolation == Checked::Valid(Interpolation::CubicSpline)
+}
+
 fn check_times(times: &Accessor, facts: &Facts) -> Result<(), String> {
-    let floats = times.component == Component::F32 && times.shape == Shape::SCALAR;
+    let floats = times.component == ComponentType::F32 && times.shape == Type::Scalar;
     if !floats || times.is_interleaved() {
         return Err("its key times are not a packed array of floats".into());
     }
@@ -69,13 +76,15 @@ fn check_target(channel: &Channel, document: &Document) -> Result<(), String> {
             _ => Err("its animation pointer is not one, or has a node beside it".into()),
         };
     }
-    let Some(node) = target.node.map(|node| &document.nodes[node as usize]) else { return Ok(()) };
+    let Some(node) = target.node else { return Ok(()) };
+    let has_matrix = document.beside.transforms[node.value()].matrix.is_some();
+    let node = &document.nodes[node.value()];
     match target.path.as_str() {
-        "translation" | "rotation" | "scale" if node.matrix.is_some() => {
+        "translation" | "rotation" | "scale" if has_matrix => {
             Err("moves a node that has a matrix".into())
         }
-        "weights" => match node.mesh.map(|mesh| &document.meshes[mesh as usize].primitives[0]) {
-            Some(primitive) if !primitive.targets.is_empty() => Ok(()),
+        "weights" => match node.mesh.map(|mesh| &document.meshes[mesh.value()].primitives[0]) {
+            Some(primitive) if morph_targets(primitive) > 0 => Ok(()),
             _ => Err("animates the weights of a mesh without morph targets".into()),
         },
         _ => Ok(()),
@@ -84,35 +93,32 @@ fn check_target(channel: &Channel, document: &Document) -> Result<(), String> {
 
 fn check_values(
     channel: &Channel,
-    animation: &Animation,
+    sampler: &Sampler,
     document: &Document,
     accessors: &[Accessor],
 ) -> Result<(), String> {
-    let sampler = &animation.samplers[channel.sampler as usize];
-    let keys = accessors[sampler.input as usize].count;
-    let values = &accessors[sampler.output as usize];
-    let cubic = match sampler.interpolation.as_str() {
-        "LINEAR" | "STEP" => false,
-        "CUBICSPLINE" if keys < 2 => return Err("is a spline with fewer than two keys".into()),
-        "CUBICSPLINE" => true,
-        other => return Err(format!("has unknown interpolation {other:?}")),
-    };
+    let keys = accessors[sampler.input.value()].count;
+    let values = &accessors[sampler.output.value()];
+    let cubic = is_cubic(sampler);
+    if cubic && keys < 2 {
+        return Err("is a spline with fewer than two keys".into());
+    }
     if values.is_interleaved() {
         return Err("its values are not a packed array".into());
     }
-    let signed_or_unsigned_norm = values.normalized && values.component != Component::U32;
-    let is_number = values.component == Component::F32 || signed_or_unsigned_norm;
+    let signed_or_unsigned_norm = values.normalized && values.component != ComponentType::U32;
+    let is_number = values.component == ComponentType::F32 || signed_or_unsigned_norm;
     let path = channel.target.path.as_str();
     let (allowed, in_a_key) = match path {
         "translation" | "scale" => {
-            (values.component == Component::F32 && values.shape == Shape::VEC3, 1)
+            (values.component == ComponentType::F32 && values.shape == Type::Vec3, 1)
         }
-        "rotation" => (is_number && values.shape == Shape::VEC4, 1),
+        "rotation" => (is_number && values.shape == Type::Vec4, 1),
         "weights" => {
-            let node = channel.target.node.map(|node| &document.nodes[node as usize]);
-            let mesh = node.and_then(|node| node.mesh).map(|mesh| &document.meshes[mesh as usize]);
-            let targets = mesh.map_or(1, |mesh| mesh.primitives[0].targets.len());
-            (is_number && values.shape == Shape::SCALAR, targets)
+            let node = channel.target.node.map(|node| &document.nodes[node.value()]);
+            let mesh = node.and_then(|node| node.mesh).map(|mesh| &document.meshes[mesh.value()]);
+            let targets = mesh.map_or(1, |mesh| morph_targets(&mesh.primitives[0]));
+            (is_number && values.shape == Type::Scalar, targets)
         }
         // What an animation pointer leads to is checked where it is read.
         _ => return Ok(()),
@@ -130,7 +136,7 @@ fn check_values(
 /// Of a spline only the middle of each three is a rotation. Arrays without data are not read.
 fn quaternions_are_unit(values: &Accessor, cubic: bool) -> bool {
     let tolerance = match values.component {
-        Component::F32 => QUATERNION_TOLERANCE,
+        ComponentType::F32 => QUATERNION_TOLERANCE,
         _ => COARSE_QUATERNION_TOLERANCE,
     };
     let (first, step) = if cubic { (1, 3) } else { (0, 1) };

@@ -3,6 +3,7 @@
 use crate::ingest::error::Fault;
 use crate::ingest::gltf::accessors::Accessor;
 use crate::ingest::gltf::document::{Document, label};
+use serde_json::Value;
 
 /// How far data may lie outside the declared bounds, relative to the largest of them: writers
 /// round bounds to few digits.
@@ -20,11 +21,12 @@ pub(super) fn check(document: &Document, accessors: &[Accessor]) -> Result<Vec<F
     let mut facts = Vec::with_capacity(accessors.len());
     for (i, (row, accessor)) in document.accessors.iter().zip(accessors).enumerate() {
         let fault = |problem: &str| Fault::new(label("accessor", i, row.name.as_deref()), problem);
-        let components = accessor.shape.components();
-        for bounds in [&row.min, &row.max].into_iter().flatten() {
-            if bounds.len() != components {
-                return Err(fault("its min or max has another number of components"));
-            }
+        let components = accessor.shape.multiplicity();
+        let (min, max) = bounds(&row.min)
+            .zip(bounds(&row.max))
+            .ok_or_else(|| fault("its min or max is not a list of 32-bit numbers"))?;
+        if [&min, &max].into_iter().flatten().any(|bounds| bounds.len() != components) {
+            return Err(fault("its min or max has another number of components"));
         }
         if !accessor.has_data() {
             facts.push(Facts { largest: 0.0, ascends: false });
@@ -42,14 +44,21 @@ pub(super) fn check(document: &Document, accessors: &[Accessor]) -> Result<Vec<F
         if !finite {
             return Err(fault("holds a number that is infinite or not a number"));
         }
-        let declared = row.min.iter().chain(&row.max).flatten().map(|bound| bound.f64().abs());
+        let declared = min.iter().chain(&max).flatten().map(|bound| bound.abs());
         let slack = BOUNDS_TOLERANCE * declared.fold(0.0, f64::max);
-        let below = row.min.iter().flatten().zip(least).any(|(min, v)| v < min.f64() - slack);
-        let above = row.max.iter().flatten().zip(most).any(|(max, v)| v > max.f64() + slack);
+        let below = min.iter().flatten().zip(least).any(|(min, v)| v < min - slack);
+        let above = max.iter().flatten().zip(most).any(|(max, v)| v > max + slack);
         if below || above {
             return Err(fault("holds numbers outside the min and max that it declares"));
         }
         facts.push(Facts { largest: most.into_iter().fold(0.0, f64::max), ascends });
     }
     Ok(facts)
+}
+
+/// The outer `None` is what cannot be read.
+fn bounds(value: &Option<Value>) -> Option<Option<Vec<f64>>> {
+    let Some(value) = value else { return Some(None) };
+    let number = |number: &Value| number.as_f64().filter(|&number| (number as f32).is_finite());
+    value.as_array()?.iter().map(number).collect::<Option<_>>().map(Some)
 }

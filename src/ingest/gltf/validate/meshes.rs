@@ -2,8 +2,11 @@
 
 use super::data::Facts;
 use crate::ingest::error::Fault;
-use crate::ingest::gltf::accessors::{Accessor, Component, Shape};
-use crate::ingest::gltf::document::{Document, Instancing, Primitive, label};
+use crate::ingest::gltf::accessors::Accessor;
+use crate::ingest::gltf::document::{Document, Instancing, label, morph_targets};
+use gltf::json::accessor::{ComponentType, Type};
+use gltf::json::mesh::{Primitive, Semantic};
+use gltf::json::validation::Checked;
 
 pub(super) fn check(
     document: &Document,
@@ -19,16 +22,13 @@ pub(super) fn check(
         for primitive in &mesh.primitives {
             check_primitive(primitive, accessors, facts, quantized).map_err(fault)?;
         }
-        let targets = |primitive: &Primitive| primitive.targets.len();
-        if mesh.weights.as_ref().is_some_and(|w| w.len() != targets(&mesh.primitives[0])) {
+        if mesh.weights.as_ref().is_some_and(|w| w.len() != morph_targets(&mesh.primitives[0])) {
             return Err(fault("has another number of weights than morph targets".into()));
         }
     }
-    for (i, node) in document.nodes.iter().enumerate() {
-        if let Some(instancing) = &node.extensions.instancing {
-            check_instancing(instancing, accessors)
-                .map_err(|problem| Fault::new(label("node", i, node.name.as_deref()), problem))?;
-        }
+    for (&i, instancing) in &document.beside.instances {
+        let object = || label("node", i, document.nodes[i].name.as_deref());
+        check_instancing(instancing, accessors).map_err(|problem| Fault::new(object(), problem))?;
     }
     Ok(())
 }
@@ -39,60 +39,54 @@ fn check_primitive(
     facts: &[Facts],
     quantized: bool,
 ) -> Result<(), String> {
-    if primitive.mode > 6 {
-        return Err(format!("has unknown primitive mode {}", primitive.mode));
-    }
     let mut vertices = None;
     for (semantic, &index) in &primitive.attributes {
-        let accessor = &accessors[index as usize];
+        let accessor = &accessors[index.value()];
         if !attribute_allows(semantic, accessor, quantized) {
-            let (component, shape) = (accessor.component, accessor.shape);
-            return Err(format!("its {semantic} cannot be {component:?} x {}", shape.components()));
+            let (component, components) = (accessor.component, accessor.shape.multiplicity());
+            let semantic = semantic.to_string();
+            return Err(format!("its {semantic} cannot be {component:?} x {components}"));
         }
         if *vertices.get_or_insert(accessor.count) != accessor.count {
             return Err("its attributes have different numbers of vertices".into());
         }
     }
-    let vertices = vertices.unwrap_or(0);
-    for (semantic, &index) in primitive.targets.iter().flatten() {
-        if accessors[index as usize].count != vertices {
-            return Err(format!("its morph target {semantic} has another number of vertices"));
-        }
-    }
     let Some(index) = primitive.indices else { return Ok(()) };
-    let indices = &accessors[index as usize];
-    let integers = indices.component.is_unsigned() && !indices.normalized;
-    if !integers || indices.shape != Shape::SCALAR || indices.is_interleaved() {
+    let indices = &accessors[index.value()];
+    let integers = indices.is_unsigned() && !indices.normalized;
+    if !integers || indices.shape != Type::Scalar || indices.is_interleaved() {
         return Err("its indices are not a packed array of unsigned integers".into());
     }
-    let largest = facts[index as usize].largest;
-    if largest >= vertices as f64 && primitive.attributes.contains_key("POSITION") {
+    let vertices = vertices.unwrap_or(0);
+    let largest = facts[index.value()].largest;
+    if largest >= vertices as f64
+        && primitive.attributes.contains_key(&Checked::Valid(Semantic::Positions))
+    {
         return Err(format!("has an index {largest}, but only {vertices} vertices"));
     }
     Ok(())
 }
 
 /// Core glTF's table of attributes (3.7.2.1), and `KHR_mesh_quantization`'s.
-fn attribute_allows(semantic: &str, accessor: &Accessor, quantized: bool) -> bool {
+fn attribute_allows(semantic: &Checked<Semantic>, accessor: &Accessor, quantized: bool) -> bool {
     let (component, normalized, shape) = (accessor.component, accessor.normalized, accessor.shape);
-    let float = component == Component::F32;
-    let small = !float && component != Component::U32;
-    let unsigned_norm = small && component.is_unsigned() && normalized;
-    let signed_norm = small && !component.is_unsigned() && normalized;
-    let set =
-        |prefix: &str| semantic.strip_prefix(prefix).is_some_and(|n| n.parse::<u32>().is_ok());
+    let float = component == ComponentType::F32;
+    let small = !float && component != ComponentType::U32;
+    let unsigned_norm = small && accessor.is_unsigned() && normalized;
+    let signed_norm = small && !accessor.is_unsigned() && normalized;
+    let Checked::Valid(semantic) = semantic else { return false };
     match semantic {
-        "POSITION" => shape == Shape::VEC3 && (float || quantized && small),
-        "NORMAL" => shape == Shape::VEC3 && (float || quantized && signed_norm),
-        "TANGENT" => shape == Shape::VEC4 && (float || quantized && signed_norm),
-        _ if set("TEXCOORD_") => {
-            shape == Shape::VEC2 && (float || unsigned_norm || quantized && small)
+        Semantic::Positions => shape == Type::Vec3 && (float || quantized && small),
+        Semantic::Normals => shape == Type::Vec3 && (float || quantized && signed_norm),
+        Semantic::Tangents => shape == Type::Vec4 && (float || quantized && signed_norm),
+        Semantic::TexCoords(_) => {
+            shape == Type::Vec2 && (float || unsigned_norm || quantized && small)
         }
-        _ if set("COLOR_") => {
-            (shape == Shape::VEC3 || shape == Shape::VEC4) && (float || unsigned_norm)
+        Semantic::Colors(_) => {
+            (shape == Type::Vec3 || shape == Type::Vec4) && (float || unsigned_norm)
         }
-        // Skins are not read, custom attributes neither.
-        _ => true,
+        // Skins are not read, the application's own attributes neither.
+        Semantic::Joints(_) | Semantic::Weights(_) | Semantic::Extras(_) => true,
     }
 }
 
@@ -100,12 +94,12 @@ fn attribute_allows(semantic: &str, accessor: &Accessor, quantized: bool) -> boo
 fn check_instancing(instancing: &Instancing, accessors: &[Accessor]) -> Result<(), String> {
     let mut instances = None;
     for (semantic, &index) in &instancing.attributes {
-        let accessor = &accessors[index as usize];
-        let float = accessor.component == Component::F32;
-        let signed_norm = accessor.normalized && !accessor.component.is_unsigned();
+        let accessor = &accessors[index.value()];
+        let float = accessor.component == ComponentType::F32;
+        let signed_norm = accessor.normalized && !accessor.is_unsigned();
         let allowed = match semantic.as_str() {
-            "TRANSLATION" | "SCALE" => float && accessor.shape == Shape::VEC3,
-            "ROTATION" => (float || signed_norm) && accessor.shape == Shape::VEC4,
+            "TRANSLATION" | "SCALE" => float && accessor.shape == Type::Vec3,
+            "ROTATION" => (float || signed_norm) && accessor.shape == Type::Vec4,
             _ => true,
         };
         if !allowed {

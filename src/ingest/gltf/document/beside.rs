@@ -1,0 +1,184 @@
+//! What a file says and the `gltf` crate's types do not, or not well enough.
+
+use super::{Real, Row};
+use gltf::json::accessor::{VALID_ACCESSOR_TYPES, VALID_COMPONENT_TYPES, VALID_INDEX_TYPES};
+use gltf::json::animation::{Sampler, VALID_INTERPOLATIONS};
+use gltf::json::camera::VALID_CAMERA_TYPES;
+use gltf::json::extensions::scene::khr_lights_punctual::VALID_TYPES as VALID_LIGHT_TYPES;
+use gltf::json::material::VALID_ALPHA_MODES;
+use gltf::json::mesh::{Semantic, VALID_MODES};
+use gltf::json::validation::Checked;
+use gltf::json::{Accessor, Index, Node, texture};
+use serde::Deserialize;
+use serde::de::DeserializeOwned;
+use serde_json::{Value, from_value, json};
+use std::collections::{BTreeMap, BTreeSet};
+use std::error::Error;
+use std::mem;
+
+type Prepared = Result<(), Box<dyn Error>>;
+
+/// What was taken out, by the number of the object.
+#[derive(Default)]
+pub(in crate::ingest::gltf) struct Beside {
+    /// Of every node, in double precision: large translations cancel and leave small ones.
+    pub transforms: Vec<Transform>,
+    /// `EXT_mesh_gpu_instancing` of nodes.
+    pub instances: BTreeMap<usize, Instancing>,
+    /// Nodes that `KHR_node_visibility` hides.
+    pub hidden: BTreeSet<usize>,
+    /// Normal map of every material: the crate's has no `KHR_texture_transform`.
+    pub normal_maps: Vec<Option<texture::Info>>,
+    /// Channels of every animation: the crate's need a node and have no `KHR_animation_pointer`.
+    pub channels: Vec<Vec<Channel>>,
+}
+
+/// A node's place below its parent.
+pub(in crate::ingest::gltf) struct Transform {
+    pub matrix: Option<[Real; 16]>,
+    pub translation: Option<[Real; 3]>,
+    pub rotation: Option<[Real; 4]>,
+    pub scale: Option<[Real; 3]>,
+}
+
+#[derive(Deserialize)]
+pub(in crate::ingest::gltf) struct Instancing {
+    pub attributes: BTreeMap<String, Index<Accessor>>,
+}
+
+#[derive(Deserialize)]
+struct Visibility {
+    visible: Option<bool>,
+}
+
+#[derive(Deserialize)]
+pub(in crate::ingest::gltf) struct Channel {
+    pub sampler: Index<Sampler>,
+    pub target: Target,
+}
+
+#[derive(Deserialize)]
+pub(in crate::ingest::gltf) struct Target {
+    pub node: Option<Index<Node>>,
+    pub path: String,
+    #[serde(default)]
+    pub extensions: TargetExtensions,
+}
+
+#[derive(Default, Deserialize)]
+pub(in crate::ingest::gltf) struct TargetExtensions {
+    #[serde(rename = "KHR_animation_pointer")]
+    pub pointer: Option<Pointer>,
+}
+
+#[derive(Deserialize)]
+pub(in crate::ingest::gltf) struct Pointer {
+    pub pointer: String,
+}
+
+impl Beside {
+    pub(super) fn node(&mut self, row: &mut Row) -> Prepared {
+        let number = self.transforms.len();
+        self.transforms.push(Transform {
+            matrix: take(row, "matrix")?,
+            translation: take(row, "translation")?,
+            rotation: take(row, "rotation")?,
+            scale: take(row, "scale")?,
+        });
+        if let Some(extensions) = row.get_mut("extensions").and_then(Value::as_object_mut) {
+            let instances = take(extensions, "EXT_mesh_gpu_instancing")?;
+            self.instances.extend(instances.map(|instances| (number, instances)));
+            let visibility: Option<Visibility> = take(extensions, "KHR_node_visibility")?;
+            let visible = visibility.and_then(|visibility| visibility.visible).unwrap_or(true);
+            self.hidden.extend((!visible).then_some(number));
+        }
+        Ok(())
+    }
+
+    pub(super) fn material(&mut self, row: &mut Row) -> Prepared {
+        known("alpha mode", row.get("alphaMode"), VALID_ALPHA_MODES)?;
+        let normal_map = row.get("normalTexture").map_or(Ok(None), Option::deserialize)?;
+        self.normal_maps.push(normal_map);
+        Ok(())
+    }
+
+    pub(super) fn animation(&mut self, row: &mut Row) -> Prepared {
+        let channels = row.insert("channels".into(), json!([])).ok_or("has no channels")?;
+        self.channels.push(from_value(channels)?);
+        rows(row, "samplers").try_for_each(|sampler| {
+            known("interpolation", sampler.get("interpolation"), VALID_INTERPOLATIONS)
+        })
+    }
+}
+
+pub(super) fn accessor(row: &mut Row) -> Prepared {
+    known("component type", row.get("componentType"), VALID_COMPONENT_TYPES)?;
+    known("type", row.get("type"), VALID_ACCESSOR_TYPES)?;
+    let indices = row.get("sparse").and_then(|sparse| sparse.pointer("/indices/componentType"));
+    known("component type of sparse indices", indices, VALID_INDEX_TYPES)
+}
+
+pub(super) fn camera(row: &mut Row) -> Prepared {
+    known("type", row.get("type"), VALID_CAMERA_TYPES)?;
+    // Neither orthographic projections nor clipping planes are read.
+    row.remove("orthographic");
+    if let Some(lens) = row.get_mut("perspective").and_then(Value::as_object_mut) {
+        lens.remove("zfar");
+        lens.insert("znear".into(), json!(0));
+    }
+    Ok(())
+}
+
+pub(super) fn light(row: &mut Row) -> Prepared {
+    known("type", row.get("type"), VALID_LIGHT_TYPES)
+}
+
+/// An empty scene has no nodes; the crate wants the list.
+pub(super) fn scene(row: &mut Row) -> Prepared {
+    row.entry("nodes").or_insert_with(|| json!([]));
+    Ok(())
+}
+
+/// The crate takes all attributes with odd names for one, and ignores those of morph targets. They
+/// become the application's own: they are not read, but checked like the others.
+pub(super) fn mesh(row: &mut Row) -> Prepared {
+    for primitive in rows(row, "primitives") {
+        known("primitive mode", primitive.get("mode"), VALID_MODES)?;
+        let targets = primitive.get("targets").map_or(Ok(Vec::new()), Vec::<Row>::deserialize)?;
+        if let Some(attributes) = primitive.get_mut("attributes").and_then(Value::as_object_mut) {
+            for (name, index) in mem::take(attributes) {
+                let semantic: Checked<Semantic> = from_value(json!(name))?;
+                let unchanged = semantic.to_string() == name;
+                attributes.insert(if unchanged { name } else { format!("_{name}") }, index);
+            }
+            for (i, target) in targets.into_iter().enumerate() {
+                let own = |(name, index)| (format!("_target {i} {name}"), index);
+                attributes.extend(target.into_iter().map(own));
+            }
+        }
+    }
+    Ok(())
+}
+
+/// The crate forgets what it does not know, and cuts numbers to 32 bits before it looks.
+fn known<V: Copy>(what: &str, value: Option<&Value>, valid: &[V]) -> Prepared
+where
+    Value: PartialEq<V>,
+{
+    match value {
+        Some(value) if valid.iter().all(|valid| value != valid) => {
+            Err(format!("has unknown {what} {value}").into())
+        }
+        _ => Ok(()),
+    }
+}
+
+fn take<T: DeserializeOwned>(row: &mut Row, key: &str) -> serde_json::Result<Option<T>> {
+    from_value(row.remove(key).unwrap_or_default())
+}
+
+/// The objects in a list of an object.
+fn rows<'a>(row: &'a mut Row, key: &str) -> impl Iterator<Item = &'a mut Row> {
+    let list = row.get_mut(key).and_then(Value::as_array_mut);
+    list.into_iter().flatten().filter_map(Value::as_object_mut)
+}
