@@ -22,8 +22,11 @@ use serde_json::{Map, Value};
 use std::error::Error;
 use std::ops::Deref;
 
-/// More JSON than this is not parsed: a value takes up to thirty times the memory of its text.
+/// More JSON than this is not parsed: a plain value takes up to thirty times the memory of its text.
 const MOST_JSON_BYTES: usize = 512 << 20;
+
+/// Longer tables are refused: a row of two bytes takes about a kilobyte when it is parsed.
+const MOST_ROWS: usize = 1 << 22;
 
 /// An object of the file that is not parsed yet.
 type Row = Map<String, Value>;
@@ -158,6 +161,10 @@ fn table<T: DeserializeOwned>(
     mut prepare: impl FnMut(&mut Row) -> Result<(), Box<dyn Error>>,
 ) -> Result<Vec<T>, Fault> {
     let rows: Vec<Value> = optional(json, key)?.unwrap_or_default();
+    if rows.len() > MOST_ROWS {
+        let problem = format!("{} of them are more than the {MOST_ROWS} that are read", rows.len());
+        return Err(Fault::new(key, problem).remedy("divide the scene"));
+    }
     let row = |(i, mut value): (usize, Value)| {
         let object = label(kind, i, value.get("name").and_then(Value::as_str));
         let Some(row) = value.as_object_mut() else {
