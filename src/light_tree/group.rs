@@ -42,7 +42,11 @@ pub(super) struct Lanes {
 impl Group {
     /// One lane as a node; `None` if it is not used.
     pub fn node(&self, lane: usize) -> Option<Node> {
-        (self.link[lane] != 0).then(|| Node {
+        (self.link[lane] != 0).then(|| self.lane(lane))
+    }
+
+    fn lane(&self, lane: usize) -> Node {
+        Node {
             center: self.center.map(|axis| axis[lane]),
             energy: self.energy[lane],
             half_extent: self.half_extent.map(|axis| axis[lane]),
@@ -52,7 +56,7 @@ impl Group {
             theta_e: self.theta_e[lane],
             reserved: self.reserved[lane],
             link: self.link[lane],
-        })
+        }
     }
 
     /// The nodes of the lanes that are used.
@@ -89,13 +93,8 @@ impl Group {
 
     /// Whether an unused lane holds anything but zeros.
     pub(super) fn has_dirty_lane(&self) -> bool {
-        (0..WIDTH).any(|lane| {
-            let mut marked = *self;
-            marked.link[lane] = 1;
-            let blank = Node { link: 1, ..Node::zeroed() };
-            let node = marked.node(lane).expect("the lane is marked as used");
-            self.link[lane] == 0 && bytemuck::bytes_of(&node) != bytemuck::bytes_of(&blank)
-        })
+        let mut unused = (0..WIDTH).filter(|&lane| self.link[lane] == 0);
+        unused.any(|lane| bytemuck::bytes_of(&self.lane(lane)) != [0; size_of::<Node>()])
     }
 
     #[inline(always)]
