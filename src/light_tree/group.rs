@@ -5,7 +5,7 @@
 //! intermediate cluster blurs it; and a smaller file, because the intermediate clusters are gone.
 //! Fields are kept apart, lane by lane, as vector instructions want them.
 
-use super::importance::Cluster;
+use super::importance::{Cluster, Receiver, factors, importance};
 use super::node::{self, Link, Node};
 use bytemuck::{Pod, Zeroable};
 use std::array::from_fn;
@@ -112,6 +112,24 @@ impl Group {
             cos_theta_e: self.theta_e.map(node::decode_cos_theta_e),
             two_sided: self.theta_o.map(node::is_two_sided),
         }
+    }
+}
+
+impl Group {
+    /// The importance of each lane; 0 for a lane that is not used.
+    #[inline]
+    pub fn importances(&self, receiver: &Receiver) -> [f64; WIDTH] {
+        let mut products = [0.0; WIDTH];
+        let mut distances2 = [0.0; WIDTH];
+        let lanes = self.decode();
+        for lane in 0..WIDTH {
+            (products[lane], distances2[lane]) = factors(&lanes.cluster(lane), receiver);
+        }
+        let mut weights = [0.0; WIDTH];
+        for lane in 0..WIDTH {
+            weights[lane] = importance(self.energy(lane), products[lane], distances2[lane]);
+        }
+        weights
     }
 }
 

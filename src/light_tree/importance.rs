@@ -12,8 +12,6 @@
 //! The formula is written once, for one lane, without a branch, so that the compiler computes the
 //! eight lanes of a group together.
 
-use super::group::{Group, WIDTH};
-use super::node::Node;
 use glam::Vec3;
 
 /// Where light is wanted: the one description that sampling and its probability share.
@@ -103,35 +101,8 @@ pub(super) fn factors(cluster: &Cluster, receiver: &Receiver) -> (f32, f32) {
 /// Energy times cosines over squared distance, in double precision: energies and distances may
 /// span more than `f32` does.
 #[inline(always)]
-fn importance(energy: f32, product: f32, distance2: f32) -> f64 {
+pub(super) fn importance(energy: f32, product: f32, distance2: f32) -> f64 {
     /// Below every distance that `f32` squares, above nothing at all.
     const LEAST: f64 = 1e-60;
     f64::from(energy) * f64::from(product) / (f64::from(distance2) + LEAST)
-}
-
-impl Node {
-    /// Importance of this cluster to a receiver: an estimate of the irradiance from it, in the
-    /// scene's units; 0 only where none of its light can arrive.
-    pub fn importance(&self, receiver: &Receiver) -> f64 {
-        let (product, distance2) = factors(&self.cluster(), receiver);
-        importance(self.energy(), product, distance2)
-    }
-}
-
-impl Group {
-    /// The importance of each lane; 0 for a lane that is not used.
-    #[inline]
-    pub fn importances(&self, receiver: &Receiver) -> [f64; WIDTH] {
-        let mut products = [0.0; WIDTH];
-        let mut distances2 = [0.0; WIDTH];
-        let lanes = self.decode();
-        for lane in 0..WIDTH {
-            (products[lane], distances2[lane]) = factors(&lanes.cluster(lane), receiver);
-        }
-        let mut weights = [0.0; WIDTH];
-        for lane in 0..WIDTH {
-            weights[lane] = importance(self.energy(lane), products[lane], distances2[lane]);
-        }
-        weights
-    }
 }

@@ -12,12 +12,12 @@
 //! | `node` | 32 bytes: bounds rounded outwards, and a link |
 //! | `group` | the eight children of a cluster, lane by lane |
 //! | `importance` | what a cluster may send to a [`Receiver`] |
-//! | `build` | the partition (SAOH) and the bounds, deterministic and parallel |
+//! | `builder` | the partition (SAOH) and the bounds, deterministic and parallel |
 //! | `writer`, `records`, `tree` | the trees of a shot as a file, and that file opened |
 //! | `sampling` | picking an emitter, and the probability of the pick |
 //! | `verify` | proof that a file keeps the format's promises |
 
-mod build;
+mod builder;
 mod group;
 mod importance;
 mod node;
@@ -27,7 +27,7 @@ mod tree;
 mod verify;
 mod writer;
 
-pub use build::ALGORITHM_VERSION;
+pub use builder::ALGORITHM_VERSION;
 pub use group::{Group, WIDTH};
 pub use importance::Receiver;
 pub use node::{Link, Node};

@@ -4,7 +4,7 @@
 //! a kilometre light fit one scene. Everything that decides "no light from here" is rounded to the
 //! safe side: boxes and cones only ever grow. The layout is in the [format](crate::store).
 
-use super::importance::Cluster;
+use super::importance::{Cluster, Receiver, factors, importance};
 use crate::bounds::{Aabb, Cone, LightBounds};
 use crate::math::angle::between;
 use bytemuck::{Pod, Zeroable};
@@ -165,6 +165,15 @@ impl Node {
         } else {
             None
         }
+    }
+}
+
+impl Node {
+    /// Importance of this cluster to a receiver: an estimate of the irradiance from it, in the
+    /// scene's units; 0 only where none of its light can arrive.
+    pub fn importance(&self, receiver: &Receiver) -> f64 {
+        let (product, distance2) = factors(&self.cluster(), receiver);
+        importance(self.energy(), product, distance2)
     }
 }
 

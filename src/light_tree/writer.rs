@@ -1,6 +1,6 @@
 //! Gathers the trees of a shot and lays them out as a file.
 
-use super::build::{Groups, build_tree};
+use super::builder::{Groups, build_tree};
 use super::node::{Link, Node};
 use super::records::{self, FrameRow, LightRow, NO_TREE, TreeRow};
 use crate::bounds::LightBounds;
