@@ -118,11 +118,7 @@ impl FrameTree<'_> {
     /// descent may learn only below a cluster whose bounds were too wide to know).
     pub fn sample(&self, receiver: &Receiver, u: f64) -> Option<Pick> {
         let mut row = self.root?;
-        let tree = &self.trees[row as usize];
-        if tree.root.importance(receiver) == 0.0 {
-            return None;
-        }
-        let (mut u, mut probability, mut at) = (u, 1.0, tree.first_group);
+        let (mut u, mut probability, mut at) = (u, 1.0, self.trees[row as usize].first_group);
         // Ends whatever the bytes: links lead onwards within a tree, and to earlier trees.
         loop {
             let group = self.groups.get(at as usize)?;
@@ -150,9 +146,7 @@ impl FrameTree<'_> {
     }
 
     fn try_probability(&self, receiver: &Receiver, emitter: u32) -> Option<f64> {
-        if self.root()?.importance(receiver) == 0.0 {
-            return None;
-        }
+        self.root?;
         let fixed = self.static_leaves.slot_of.len();
         match (emitter as usize).checked_sub(fixed) {
             Some(moving) => self.chance_of(*self.moving_slots.get(moving)?, receiver),

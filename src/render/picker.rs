@@ -68,29 +68,37 @@ impl<'a> LightPicker<'a> {
                 let probability = self.probability(receiver, target);
                 (probability > 0.0).then_some(LightPick { target, probability })
             }
-            LightStrategy::Tree => {
-                self.pick_infinite_or(receiver, u, self.tree.total_importance(receiver), |u| {
+            LightStrategy::Tree => self.pick_infinite_or(
+                receiver,
+                u,
+                || self.tree.total_importance(receiver),
+                |u| {
                     let pick = self.tree.sample(receiver, u)?;
                     let target = Target::Emitter(pick.emitter);
                     Some(LightPick { target, probability: pick.probability })
-                })
-            }
+                },
+            ),
             LightStrategy::Exhaustive => {
                 let total = self.sum_of_importances(receiver);
-                self.pick_infinite_or(receiver, u, total, |u| {
-                    let mut left = u * total;
-                    let mut picked = None;
-                    self.tree.for_each_leaf(|emitter, node| {
-                        let importance = node.importance(receiver);
-                        if importance > 0.0 && left >= 0.0 {
-                            picked = Some((emitter, importance));
-                            left -= importance;
-                        }
-                    });
-                    let (emitter, importance) = picked?;
-                    let probability = importance / total;
-                    Some(LightPick { target: Target::Emitter(emitter), probability })
-                })
+                self.pick_infinite_or(
+                    receiver,
+                    u,
+                    || total,
+                    |u| {
+                        let mut left = u * total;
+                        let mut picked = None;
+                        self.tree.for_each_leaf(|emitter, node| {
+                            let importance = node.importance(receiver);
+                            if importance > 0.0 && left >= 0.0 {
+                                picked = Some((emitter, importance));
+                                left -= importance;
+                            }
+                        });
+                        let (emitter, importance) = picked?;
+                        let probability = importance / total;
+                        Some(LightPick { target: Target::Emitter(emitter), probability })
+                    },
+                )
             }
         }
     }
@@ -108,23 +116,28 @@ impl<'a> LightPicker<'a> {
                 let total = self.running_power.last().copied().unwrap_or(0.0);
                 if total > 0.0 { (self.running_power[index] - before) / total } else { 0.0 }
             }
-            LightStrategy::Tree => {
-                let of_tree = self.tree.total_importance(receiver);
-                self.share(receiver, target, of_tree, |emitter| {
-                    self.tree.probability(receiver, emitter)
-                })
-            }
+            LightStrategy::Tree => self.share(
+                receiver,
+                target,
+                || self.tree.total_importance(receiver),
+                |emitter| self.tree.probability(receiver, emitter),
+            ),
             LightStrategy::Exhaustive => {
                 let total = self.sum_of_importances(receiver);
-                self.share(receiver, target, total, |wanted| {
-                    let mut found = 0.0;
-                    self.tree.for_each_leaf(|emitter, node| {
-                        if emitter == wanted {
-                            found = node.importance(receiver) / total;
-                        }
-                    });
-                    found
-                })
+                self.share(
+                    receiver,
+                    target,
+                    || total,
+                    |wanted| {
+                        let mut found = 0.0;
+                        self.tree.for_each_leaf(|emitter, node| {
+                            if emitter == wanted {
+                                found = node.importance(receiver) / total;
+                            }
+                        });
+                        found
+                    },
+                )
             }
         }
     }
@@ -141,12 +154,13 @@ impl<'a> LightPicker<'a> {
         &self,
         receiver: &Receiver,
         u: f64,
-        of_tree: f64,
+        of_tree: impl FnOnce() -> f64,
         pick_in_tree: impl FnOnce(f64) -> Option<LightPick>,
     ) -> Option<LightPick> {
         if self.infinite.is_empty() {
             return pick_in_tree(u);
         }
+        let of_tree = of_tree();
         let total = of_tree + self.infinite_importance(receiver);
         let mut left = u * total;
         for (row, light) in self.infinite.iter().enumerate() {
@@ -170,21 +184,20 @@ impl<'a> LightPicker<'a> {
         &self,
         receiver: &Receiver,
         target: Target,
-        of_tree: f64,
+        of_tree: impl FnOnce() -> f64,
         in_tree: impl FnOnce(u32) -> f64,
     ) -> f64 {
-        let total = if self.infinite.is_empty() {
-            of_tree
-        } else {
-            of_tree + self.infinite_importance(receiver)
-        };
-        if total <= 0.0 {
-            return 0.0;
-        }
+        let chance = |part: f64, whole: f64| if part > 0.0 { part / whole } else { 0.0 };
         match target {
-            Target::Emitter(emitter) => in_tree(emitter) * (of_tree / total),
+            Target::Emitter(emitter) if self.infinite.is_empty() => in_tree(emitter),
+            Target::Emitter(emitter) => {
+                let of_tree = of_tree();
+                let total = of_tree + self.infinite_importance(receiver);
+                in_tree(emitter) * chance(of_tree, total)
+            }
             Target::Infinite(row) => {
-                self.infinite[row as usize].importance(receiver.normal) / total
+                let importance = self.infinite[row as usize].importance(receiver.normal);
+                chance(importance, of_tree() + self.infinite_importance(receiver))
             }
         }
     }

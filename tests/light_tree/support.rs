@@ -88,9 +88,6 @@ pub fn nodes(tree: &Tree) -> Vec<(Node, usize)> {
 /// turn out to be dark.
 pub fn dead_probability(tree: &Tree, receiver: &Receiver) -> f64 {
     let row = &tree.trees()[0];
-    if row.root.importance(receiver) == 0.0 {
-        return 1.0;
-    }
     let mut dead = 0.0;
     let mut open = vec![(row.first_group, 1.0)];
     while let Some((at, probability)) = open.pop() {

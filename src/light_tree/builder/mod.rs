@@ -117,10 +117,17 @@ fn build_cluster(
 /// own. Lanes that are left then take the leaves of the smallest parts, whose groups would be nearly
 /// empty.
 fn divide(items: &mut [Item], depth: usize) -> Vec<&mut [Item]> {
-    let mut parts: Vec<&mut [Item]> = vec![items];
+    let mut parts: Vec<&mut [Item]> = Vec::with_capacity(WIDTH);
+    parts.push(items);
     let mut costs = vec![f64::INFINITY];
     while let Some(at) = next_to_cut(&parts, &costs) {
+        let lanes_left = WIDTH - parts.len();
         let part = std::mem::take(&mut parts[at]);
+        if part.len() - 1 <= lanes_left {
+            costs.splice(at..=at, part.iter().map(|_| 0.0));
+            parts.splice(at..=at, part.chunks_mut(1));
+            continue;
+        }
         let by_cost = if depth < DEEPEST_BY_COST { saoh::partition(part) } else { None };
         let Halves { left_count, cost } = by_cost.unwrap_or(Halves::even(part.len()));
         let (left, right) = part.split_at_mut(left_count);
@@ -132,8 +139,7 @@ fn divide(items: &mut [Item], depth: usize) -> Vec<&mut [Item]> {
 
 /// Which part to cut next; `None` if all lanes are used or none can be cut.
 fn next_to_cut(parts: &[&mut [Item]], costs: &[f64]) -> Option<usize> {
-    let lanes_left = WIDTH - parts.len();
-    if lanes_left == 0 {
+    if parts.len() == WIDTH {
         return None;
     }
     // Coincident lights cost nothing: then the largest.
