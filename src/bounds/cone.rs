@@ -56,27 +56,31 @@ impl Cone {
         Cone { axis, theta_o, theta_e, two_sided }
     }
 
-    /// A cone around some: their unions one after the other, or the cone about the mean of their
-    /// axes, whichever is narrower.
+    /// A cone around some, about the mean of their axes. Unlike a union of one after the other it
+    /// does not depend on their order.
     ///
     /// # Panics
     /// If there are none.
     pub fn around(cones: &[Cone]) -> Cone {
-        let unions = cones[1..].iter().fold(cones[0], |all, cone| all.union(cone));
-        if unions.theta_o == 0.0 {
-            return unions;
+        if let [a, b] = cones {
+            return a.union(b);
         }
+        let two_sided = cones.iter().any(|cone| cone.two_sided);
+        let theta_e = cones.iter().map(|cone| cone.theta_e).fold(0.0, f32::max);
+        // The widest says which of two opposite axes is meant.
+        let widest = cones.iter().max_by(|a, b| a.theta_o.total_cmp(&b.theta_o));
+        let first = widest.expect("there is a cone").axis;
         let turned = |cone: &Cone| {
-            let flip = unions.two_sided && cone.axis.dot(unions.axis) < 0.0;
-            if flip { -cone.axis } else { cone.axis }
+            if two_sided && cone.axis.dot(first) < 0.0 { -cone.axis } else { cone.axis }
         };
         let sum: Vec3 = cones.iter().map(turned).sum();
-        let Some(mean) = sum.try_normalize() else { return unions };
-        let reach = cones
-            .iter()
-            .map(|cone| angle::between(mean, turned(cone)) + cone.theta_o)
-            .fold(0.0, f32::max);
-        if reach < unions.theta_o { Cone { axis: mean, theta_o: reach, ..unions } } else { unions }
+        let same = cones.iter().all(|cone| turned(cone) == first);
+        let Some(axis) = (if same { Some(first) } else { sum.try_normalize() }) else {
+            return Cone { axis: first, theta_o: PI, theta_e, two_sided };
+        };
+        let reach = |cone: &Cone| angle::between(axis, turned(cone)) + cone.theta_o;
+        let theta_o = cones.iter().map(reach).fold(0.0, f32::max).min(PI);
+        Cone { axis, theta_o, theta_e, two_sided }
     }
 
     /// How much of the sphere the cone lights, weighted by the cosine beyond `theta_o`: the seed's

@@ -34,7 +34,7 @@ pub(super) struct Lanes {
     center: [[f32; WIDTH]; 3],
     half_extent: [[f32; WIDTH]; 3],
     axis: [[f32; WIDTH]; 3],
-    cos_theta_o: [f32; WIDTH],
+    sin_half_theta_o: [f32; WIDTH],
     cos_theta_e: [f32; WIDTH],
     two_sided: [bool; WIDTH],
 }
@@ -108,7 +108,7 @@ impl Group {
             center: self.center,
             half_extent,
             axis: from_fn(|part| axis.map(|direction| direction[part])),
-            cos_theta_o: self.theta_o.map(node::decode_cos_theta_o),
+            sin_half_theta_o: self.theta_o.map(node::decode_sin_half_theta_o),
             cos_theta_e: self.theta_e.map(node::decode_cos_theta_e),
             two_sided: self.theta_o.map(node::is_two_sided),
         }
@@ -141,7 +141,7 @@ impl Lanes {
             center: of(&self.center),
             half_extent: of(&self.half_extent),
             axis: of(&self.axis),
-            cos_theta_o: self.cos_theta_o[lane],
+            sin_half_theta_o: self.sin_half_theta_o[lane],
             cos_theta_e: self.cos_theta_e[lane],
             two_sided: self.two_sided[lane],
         }

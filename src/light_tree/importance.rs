@@ -38,7 +38,7 @@ pub(super) struct Cluster {
     pub half_extent: [f32; 3],
     /// Not of unit length.
     pub axis: [f32; 3],
-    pub cos_theta_o: f32,
+    pub sin_half_theta_o: f32,
     pub cos_theta_e: f32,
     pub two_sided: bool,
 }
@@ -77,8 +77,9 @@ pub(super) fn factors(cluster: &Cluster, receiver: &Receiver) -> (f32, f32) {
     let along = if cluster.two_sided { along.abs() } else { along };
     let cosine = along.clamp(-1.0, 1.0);
     let sine = (1.0 - cosine * cosine).sqrt();
-    let cos_o = cluster.cos_theta_o;
-    let sin_o = (1.0 - cos_o * cos_o).max(0.0).sqrt();
+    let sin_half = cluster.sin_half_theta_o;
+    let cos_o = 1.0 - 2.0 * sin_half * sin_half;
+    let sin_o = 2.0 * sin_half * (1.0 - sin_half * sin_half).max(0.0).sqrt();
     let sin_sum = sin_o * cos_u + cos_o * sin_u;
     let cos_sum = cos_o * cos_u - sin_o * sin_u;
     let within = inside | (sin_sum < 0.0) | (cosine >= cos_sum);

@@ -66,9 +66,9 @@ impl Link {
 
 const TWO_SIDED_BIT: u16 = 1 << 15;
 const AXIS_STEPS: f32 = 32767.0;
-/// `1 - cos theta_o` in `[0, 2]` takes fifteen bits.
-const THETA_O_STEPS: f64 = 32767.0 / 2.0;
-/// `sqrt(1 - cos theta_e)` in `[0, 1]` takes eight: nearly even steps in angle.
+/// `sin(theta_o / 2)` in `[0, 1]` takes fifteen bits: nearly even steps in angle, 1e-4 rad.
+const THETA_O_STEPS: f64 = 32767.0;
+/// `sqrt(1 - cos theta_e)` in `[0, 1]` takes eight, likewise.
 const THETA_E_STEPS: f64 = 255.0;
 /// Forgiven when an angle is rounded up, relative: what `f32` loses between decoding and encoding
 /// again, which must not widen a cone. Far below the slack that importance grants.
@@ -82,8 +82,8 @@ impl Node {
         let axis = encode_axis(bounds.cone.axis);
         let tilt = between(Vec3::from_array(decode_axis(axis)).normalize(), bounds.cone.axis);
         // `between` of equal vectors is exactly 0, so an axis that survives costs no widening.
-        let theta_o = (one_minus_cos(bounds.cone.theta_o + tilt) * THETA_O_STEPS).ceil();
-        let theta_e = (one_minus_cos(bounds.cone.theta_e).sqrt() * THETA_E_STEPS).ceil();
+        let theta_o = (sin_half(bounds.cone.theta_o + tilt) * THETA_O_STEPS).ceil();
+        let theta_e = (2f64.sqrt() * sin_half(bounds.cone.theta_e) * THETA_E_STEPS).ceil();
         let two_sided = if bounds.cone.two_sided { TWO_SIDED_BIT } else { 0 };
         Node {
             center: center.to_array(),
@@ -101,15 +101,15 @@ impl Node {
     /// The bounds as sampling sees them: those that were encoded, and a little more.
     pub fn bounds(&self) -> LightBounds {
         let (center, half) = (self.center().as_dvec3(), self.half_extent().as_dvec3());
-        let angle = |one_minus_cos: f64| 2.0 * (0.5 * one_minus_cos).sqrt().min(1.0).asin();
+        let angle = |sin_half: f64| (2.0 * sin_half.min(1.0).asin()) as f32;
         let theta_o = f64::from(self.theta_o & !TWO_SIDED_BIT) / THETA_O_STEPS;
-        let theta_e = (f64::from(self.theta_e) / THETA_E_STEPS).powi(2);
+        let theta_e = f64::from(self.theta_e) / (2f64.sqrt() * THETA_E_STEPS);
         LightBounds {
             aabb: Aabb { min: round_down(center - half), max: -round_down(-center - half) },
             cone: Cone {
                 axis: Vec3::from_array(decode_axis(self.axis)).normalize(),
-                theta_o: angle(theta_o) as f32,
-                theta_e: angle(theta_e) as f32,
+                theta_o: angle(theta_o),
+                theta_e: angle(theta_e),
                 two_sided: is_two_sided(self.theta_o),
             },
             energy: self.energy,
@@ -146,7 +146,7 @@ impl Node {
             center: self.center,
             half_extent: self.half_extent().to_array(),
             axis: decode_axis(self.axis),
-            cos_theta_o: decode_cos_theta_o(self.theta_o),
+            sin_half_theta_o: decode_sin_half_theta_o(self.theta_o),
             cos_theta_e: decode_cos_theta_e(self.theta_e),
             two_sided: is_two_sided(self.theta_o),
         }
@@ -200,7 +200,7 @@ impl Node {
         }
         // cos(theta_d + theta_c) >= cos(theta_p + tolerance), and the sum is not beyond pi.
         let unit = |node: &Node| Vec3::from_array(decode_axis(node.axis)).as_dvec3().normalize();
-        let cos_of = |node: &Node| 1.0 - f64::from(code(node)) / THETA_O_STEPS;
+        let cos_of = |node: &Node| 1.0 - 2.0 * (f64::from(code(node)) / THETA_O_STEPS).powi(2);
         let dot = unit(self).dot(unit(child));
         let cos_d = if is_two_sided(self.theta_o) { dot.abs() } else { dot }.clamp(-1.0, 1.0);
         let (cos_c, cos_p) = (cos_of(child), cos_of(self));
@@ -212,10 +212,10 @@ impl Node {
     }
 }
 
-/// `1 - cos` of an angle in `[0, pi]`, a hair smaller than exact: see [`ANGLE_FORGIVEN`].
-fn one_minus_cos(angle_rad: f32) -> f64 {
+/// Sine of half an angle in `[0, pi]`, a hair smaller than exact: see [`ANGLE_FORGIVEN`].
+fn sin_half(angle_rad: f32) -> f64 {
     let angle = f64::from(angle_rad).min(std::f64::consts::PI) * ANGLE_FORGIVEN;
-    2.0 * (0.5 * angle).sin().powi(2)
+    (0.5 * angle).sin()
 }
 
 /// The smallest shared exponent and the mantissas, rounded up, that reach both faces of the box
@@ -262,8 +262,8 @@ pub(super) fn scale(half_exponent: u8) -> f32 {
 }
 
 #[inline(always)]
-pub(super) fn decode_cos_theta_o(code: u16) -> f32 {
-    1.0 - f32::from(code & !TWO_SIDED_BIT) * (1.0 / THETA_O_STEPS as f32)
+pub(super) fn decode_sin_half_theta_o(code: u16) -> f32 {
+    f32::from(code & !TWO_SIDED_BIT) * (1.0 / THETA_O_STEPS as f32)
 }
 
 #[inline(always)]

@@ -21,7 +21,7 @@ use rayon::prelude::*;
 use saoh::Halves;
 
 /// Changes whenever the same bounds would give other bytes: part of every fingerprint.
-pub const ALGORITHM_VERSION: u32 = 2;
+pub const ALGORITHM_VERSION: u32 = 1;
 
 /// Below this depth clusters are cut by count: no input makes the recursion much deeper.
 const DEEPEST_BY_COST: usize = 100;
@@ -150,6 +150,9 @@ fn next_to_cut(parts: &[&mut [Item]], costs: &[f64]) -> Option<usize> {
     let large = all.clone().filter(|&i| parts[i].len() > WIDTH).max_by(by_cost);
     large.or_else(|| {
         let small = all.filter(|&i| parts[i].len() > 1);
-        small.min_by_key(|&i| parts[i].len())
+        let by_size = |&a: &usize, &b: &usize| {
+            parts[a].len().cmp(&parts[b].len()).then(costs[a].total_cmp(&costs[b]))
+        };
+        small.min_by(by_size)
     })
 }
