@@ -3,7 +3,15 @@
 
 mod bounces;
 mod closed_forms;
+mod determinism;
 mod lens;
+mod moving;
+mod real;
+mod references;
+mod rooms;
 mod shadows;
+#[path = "../ingest/shared.rs"]
+mod shared;
 mod stage;
 mod statistics;
+mod strategies;
