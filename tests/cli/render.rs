@@ -3,6 +3,7 @@
 use crate::files::{SCENE, Shot, picture};
 use serde_json::json;
 use std::path::Path;
+use std::process::{Command, Stdio};
 
 #[test]
 fn a_still_scene_is_one_picture() {
@@ -132,4 +133,22 @@ fn threads_do_not_show_in_the_file() {
         shot.candelabra(&format!("build {SCENE} -o {threads}.ltree --threads {threads}")).ends(0);
     }
     assert!(shot.read("1.ltree") == shot.read("2.ltree"));
+}
+
+/// Whoever reads the log may stop reading (`| head -1`); the frames are rendered all the same.
+#[test]
+fn a_closed_pipe_stops_no_frame() {
+    let shot = Shot::moving();
+    let mut running = Command::new(env!("CARGO_BIN_EXE_candelabra-render"))
+        .current_dir(shot.path(""))
+        .args([SCENE, "--frames", "1-9", "-o", "a.#.exr", "--res", "12x8", "--spp", "2"])
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    drop(running.stdout.take());
+    let output = running.wait_with_output().unwrap();
+    let complaint = String::from_utf8(output.stderr).unwrap();
+    assert!(output.status.success() && complaint.is_empty(), "{}: {complaint}", output.status);
+    assert!((1..=9).all(|frame| is_picture(&shot.path(&format!("a.{frame}.exr")))));
 }
