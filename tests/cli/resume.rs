@@ -49,6 +49,18 @@ fn broken_pictures_are_rendered_again() {
 }
 
 #[test]
+fn a_missing_preview_is_made() {
+    let shot = Shot::moving();
+    assert_rendered(&shot, SHOT, &[1, 2]);
+    let with_previews = format!("{SHOT} --png --exposure 0");
+    assert_rendered(&shot, &with_previews, &[1, 2]);
+    assert_rendered(&shot, &with_previews, &[]);
+    std::fs::remove_file(shot.path("a.1.png")).unwrap();
+    assert_rendered(&shot, &with_previews, &[1]);
+    assert!(shot.path("a.1.png").exists());
+}
+
+#[test]
 fn other_settings_are_another_picture() {
     let mut shot = Shot::moving();
     shot.edit(|json| json["cameras"][0]["perspective"]["yfov"] = json!(0.7));

@@ -130,7 +130,8 @@ fn render_frames<D: AsRef<[u8]> + Sync>(
     for &frame in frames.as_slice() {
         let path = arguments.output.path(frame);
         let stamp = stamp_of(frame)?;
-        if arguments.resume && stamp.is_on(&path) {
+        let has_preview = !arguments.png || path.with_extension("png").exists();
+        if arguments.resume && has_preview && stamp.is_on(&path) {
             bar.line(&format!("frame {frame}: {} is up to date", path.display()));
             bar.skip(height);
             continue;
