@@ -103,3 +103,16 @@ fn files_that_the_scene_refers_to_belong_to_it() {
     // The lamp's mesh changed too: a tree is built in memory, and is another.
     assert!(is_rendered() && !is_rendered(), "a buffer changed");
 }
+
+#[test]
+fn a_longer_shot_keeps_the_frames_it_has() {
+    let shot = Shot::moving();
+    assert_rendered(&shot, SHOT, &[1, 2]);
+    // Neither a tree in memory nor one in a file is the same for more frames; the pictures are.
+    shot.render("--resume --frames 1-4 -o a.#.exr").ends(0).says("frame 3: ");
+    assert_rendered(&shot, SHOT, &[]);
+    for frames in ["1-4", "1-8"] {
+        shot.candelabra(&format!("build {SCENE} --frames {frames}")).ends(0);
+        assert_rendered(&shot, &format!("{SHOT} --tree shot.ltree"), &[]);
+    }
+}
