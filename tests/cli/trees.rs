@@ -105,9 +105,8 @@ fn unverified_damage_is_survived() {
     for shot in [Shot::still(), Shot::moving()] {
         shot.candelabra(&format!("build {SCENE} --frames 1,2")).ends(0);
         let whole = shot.read("shot.ltree");
-        for (bit, sampler) in
-            (0..whole.len() * 8).step_by(127).zip(["tree", "power", "exhaustive"].iter().cycle())
-        {
+        let samplers = ["tree", "power", "exhaustive"].into_iter().cycle();
+        for (bit, sampler) in (0..whole.len() * 8).step_by(127).zip(samplers) {
             let mut bytes = whole.clone();
             bytes[bit / 8] ^= 1 << (bit % 8);
             shot.write("shot.ltree", bytes);

@@ -4,6 +4,7 @@
 mod bounces;
 mod closed_forms;
 mod determinism;
+mod extremes;
 mod lens;
 mod moving;
 mod real;
