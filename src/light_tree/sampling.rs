@@ -126,7 +126,7 @@ impl FrameTree<'_> {
             u = choice.leftover;
             probability *= choice.probability;
             match group.link(choice.lane) {
-                Link::Emitter(emitter) => {
+                Link::Emitter(emitter) if self.knows(emitter) => {
                     return Some(Pick { emitter, probability, leftover: u });
                 }
                 Link::Inner(ahead) => at = at.checked_add(ahead)?,
@@ -134,9 +134,15 @@ impl FrameTree<'_> {
                     row = below;
                     at = self.trees.get(row as usize)?.first_group;
                 }
-                Link::Tree(_) | Link::Nothing => return None,
+                Link::Emitter(_) | Link::Tree(_) | Link::Nothing => return None,
             }
         }
+    }
+
+    /// Whether there is an emitter of this number. In a sound tree there always is.
+    #[inline]
+    fn knows(&self, emitter: u32) -> bool {
+        (emitter as usize) < self.static_leaves.slot_of.len() + self.moving_slots.len()
     }
 
     /// The probability with which [`sample`](FrameTree::sample) picks an emitter for a receiver; 0
@@ -204,7 +210,7 @@ impl FrameTree<'_> {
             let groups = &rest[..rest.len().min(tree.group_count as usize)];
             for node in groups.iter().flat_map(Group::nodes) {
                 match node.link() {
-                    Link::Emitter(emitter) => visit(emitter, &node),
+                    Link::Emitter(emitter) if self.knows(emitter) => visit(emitter, &node),
                     Link::Tree(below) if below < row => next = Some(below),
                     _ => {}
                 }

@@ -103,7 +103,8 @@ impl std::error::Error for StaleTree {}
 /// Compares a tree with the scene it should belong to.
 ///
 /// # Errors
-/// [`TreeError::Stale`] with the lights that changed, at most ten of them named in the message.
+/// [`TreeError::Stale`] with the lights that changed, at most ten of them named in the message;
+/// [`TreeError::Broken`] if the tree's own list of lights contradicts its fingerprint.
 pub fn check_fresh<D: AsRef<[u8]>>(
     tree: &LightTree<D>,
     path: &Path,
@@ -112,10 +113,17 @@ pub fn check_fresh<D: AsRef<[u8]>>(
 ) -> Result<(), TreeError> {
     let frames: Vec<i32> = tree.frames().iter().map(|row| row.frame).collect();
     let Survey { lights, fingerprint, .. } = survey(scene, emitters, &frames)?;
-    if fingerprint == tree.fingerprint() {
+    if fingerprint != tree.fingerprint() {
+        return Err(TreeError::Stale { path: path.into(), source: compare(tree, &lights) });
+    }
+    // Nobody may have verified the tree: its list of lights is not under the header's checksum.
+    let agrees = tree.emitter_count() == emitters.len()
+        && tree.static_emitter_count() == emitters.static_count();
+    if agrees {
         return Ok(());
     }
-    Err(TreeError::Stale { path: path.into(), source: compare(tree, &lights) })
+    let source = StoreError::Checksum { part: "the list of lights".into() };
+    Err(TreeError::Broken { path: path.into(), source })
 }
 
 fn compare<D: AsRef<[u8]>>(tree: &LightTree<D>, now: &[LightSummary]) -> StaleTree {

@@ -53,7 +53,7 @@ pub struct Arguments {
     /// Beauty in 32-bit floats instead of 16
     #[arg(long)]
     pub float: bool,
-    /// Skip frames that are there, whole, and rendered from the same scene, tree and settings
+    /// Skip frames that are there, whole, and rendered from the same scene and settings
     #[arg(long)]
     pub resume: bool,
     /// Do not prove that the tree file is sound before using it

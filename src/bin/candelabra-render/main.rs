@@ -5,12 +5,16 @@ mod progress;
 mod shot;
 
 use arguments::Arguments;
+use candelabra::pipeline::TreeError;
+use candelabra::render::frame_names::FrameNamesError;
 use clap::Parser;
 use std::process::ExitCode;
 
 /// Some frames failed, or nothing could be rendered at all.
 const FAILED: u8 = 1;
-/// The tree file is stale or broken. (2 is clap's, for usage.)
+/// Usage; mostly said by clap.
+const USAGE: u8 = 2;
+/// The tree file is stale or broken.
 const BAD_TREE: u8 = 3;
 
 fn main() -> ExitCode {
@@ -23,8 +27,11 @@ fn main() -> ExitCode {
         }
         Err(error) => {
             eprintln!("candelabra-render: {error:#}");
-            let tree = error.downcast_ref::<candelabra::pipeline::TreeError>();
-            ExitCode::from(if tree.is_some() { BAD_TREE } else { FAILED })
+            ExitCode::from(match error {
+                error if error.is::<TreeError>() => BAD_TREE,
+                error if error.is::<FrameNamesError>() => USAGE,
+                _ => FAILED,
+            })
         }
     }
 }

@@ -2,6 +2,7 @@
 
 use candelabra::render::Progress;
 use indicatif::{ProgressBar, ProgressStyle};
+use std::io::Write;
 
 /// Progress over all frames of a shot, counted in rows of pixels.
 pub struct Bar(ProgressBar);
@@ -22,9 +23,12 @@ impl Bar {
         self.0.set_message(format!("frame {frame}"));
     }
 
-    /// Prints a line above the bar, on standard output.
+    /// Prints a line above the bar, on standard output. That nobody reads on (`| head`) stops no
+    /// frame.
     pub fn line(&self, text: &str) {
-        self.0.suspend(|| println!("{text}"));
+        self.0.suspend(|| {
+            let _ = writeln!(std::io::stdout(), "{text}");
+        });
     }
 
     /// Counts a frame that needed no rendering.

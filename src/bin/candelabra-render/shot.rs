@@ -4,7 +4,7 @@ use crate::arguments::Arguments;
 use crate::progress::Bar;
 use anyhow::{Context, Result, anyhow, bail};
 use candelabra::emitter::Emitters;
-use candelabra::light_tree::LightTree;
+use candelabra::light_tree::{ALGORITHM_VERSION, LightTree};
 use candelabra::pipeline::{self, BuildOptions};
 use candelabra::render::exr::{ExrOptions, read_metadata, write_exr};
 use candelabra::render::frames::Frames;
@@ -82,10 +82,10 @@ struct Stamp {
 const SOFTWARE: &str = concat!("candelabra-render ", env!("CARGO_PKG_VERSION"));
 
 impl Stamp {
-    /// Over everything that the pixels depend on.
+    /// Over everything that the pixels depend on. The tree is not named: a fresh one follows from
+    /// the scene and the algorithm, and its own fingerprint is of all frames that it was built for.
     fn new(
         scene_fingerprint: &[u8; 32],
-        tree_fingerprint: &[u8; 32],
         camera: &Camera,
         arguments: &Arguments,
         settings: &RenderSettings,
@@ -93,8 +93,9 @@ impl Stamp {
     ) -> Result<Stamp> {
         let settings = serde_json::to_value(settings)?;
         let mut hasher = blake3::Hasher::new();
-        hasher.update(scene_fingerprint).update(tree_fingerprint);
-        let rest = format!("{SOFTWARE} {camera:?} {} {settings} {frame}", arguments.float);
+        hasher.update(scene_fingerprint);
+        let float = arguments.float;
+        let rest = format!("{SOFTWARE} {ALGORITHM_VERSION} {camera:?} {float} {settings} {frame}");
         hasher.update(rest.as_bytes());
         let fingerprint = hasher.finalize().to_hex().to_string();
         Ok(Stamp { software: SOFTWARE.into(), frame, fingerprint, settings })
@@ -118,10 +119,7 @@ fn render_frames<D: AsRef<[u8]> + Sync>(
 ) -> Result<usize> {
     let settings = arguments.settings(camera.aspect);
     let scene_fingerprint = pipeline::scene_fingerprint(scene)?;
-    let stamp_of = |frame| {
-        let tree = tree.fingerprint();
-        Stamp::new(&scene_fingerprint, &tree, &camera, arguments, &settings, frame)
-    };
+    let stamp_of = |frame| Stamp::new(&scene_fingerprint, &camera, arguments, &settings, frame);
     let height = settings.height;
     let bar = Bar::new(frames.as_slice().len(), height);
     // Prepared when the first frame needs it: a finished shot resumes at once.
@@ -130,7 +128,8 @@ fn render_frames<D: AsRef<[u8]> + Sync>(
     for &frame in frames.as_slice() {
         let path = arguments.output.path(frame);
         let stamp = stamp_of(frame)?;
-        if arguments.resume && stamp.is_on(&path) {
+        let has_preview = !arguments.png || path.with_extension("png").exists();
+        if arguments.resume && has_preview && stamp.is_on(&path) {
             bar.line(&format!("frame {frame}: {} is up to date", path.display()));
             bar.skip(height);
             continue;

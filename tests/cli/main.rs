@@ -1,0 +1,7 @@
+//! The two programs, as a pipeline TD and a farm use them.
+
+mod build;
+mod files;
+mod render;
+mod resume;
+mod trees;

@@ -1,0 +1,194 @@
+//! Lights that move: one tree a frame over those, above one tree over all that stand still.
+
+use crate::rooms;
+use crate::stage::{Set, Stage, at, by, glow};
+use crate::statistics::Estimate;
+use crate::strategies::{SIZE, disagreement, render};
+use candelabra::light_tree::{FrameTree, Receiver};
+use candelabra::render::{FrameError, LightStrategy, RenderDelegate, RenderSettings};
+use candelabra::scene::{Channel, Interpolation, Keys, LightKind, Scene, Trs};
+use glam::{DAffine3, DMat3, DVec3, Quat, Vec3};
+
+pub const FRAMES: [i32; 3] = [1, 13, 25];
+
+/// A room in which a carousel of lights turns and drifts, one of them on an arm of its own; a card
+/// without light moves too. The clock is the default one: frame 25 is one second.
+pub fn carousel() -> Stage {
+    let mut stage = rooms::lambert_room();
+    let hub = stage.node(at(DVec3::new(-0.6, 0.8, 0.2)));
+    let turn = |angle: f32| Quat::from_rotation_y(angle);
+    let keys = |values: Vec<Quat>| Keys {
+        times_s: vec![0.0, 0.5, 1.0],
+        values,
+        interpolation: Interpolation::Linear,
+    };
+    let drift = Keys {
+        times_s: vec![0.0, 1.0],
+        values: vec![Vec3::new(-0.6, 0.8, 0.2), Vec3::new(0.7, 0.5, 0.4)],
+        interpolation: Interpolation::Linear,
+    };
+    stage.scene.nodes[hub as usize].channels = vec![
+        Channel::Rotation(keys(vec![turn(0.0), turn(1.0), turn(2.5)])),
+        Channel::Translation(drift),
+    ];
+    let first = stage.scene.nodes.len();
+    stage.quad([0.3; 2], glow(Vec3::new(9.0, 6.0, 3.0)), at(DVec3::X * 0.4));
+    stage.ball(0.15, 2, glow(Vec3::new(2.0, 4.0, 9.0)), at(DVec3::new(-0.3, -0.1, 0.3)));
+    stage.light(LightKind::Point { intensity_cd: Vec3::splat(0.4) }, at(DVec3::Z * 0.4));
+    let radiance_nits = Vec3::new(4.0, 9.0, 4.0);
+    let sphere = LightKind::Sphere { radiance_nits, radius: 0.1, shaping: None };
+    stage.light(sphere, at(DVec3::new(0.1, 0.3, -0.3)));
+    stage.quad([0.3; 2], candelabra::scene::Material::default(), at(DVec3::Y * -0.3));
+    for node in &mut stage.scene.nodes[first..] {
+        node.parent = Some(hub);
+    }
+    stage
+}
+
+/// The same scene as it stands in a frame, for good.
+fn frozen(stage: &mut Stage, frame: i32) {
+    let scene = &mut stage.scene;
+    let pose = scene.pose_at(scene.timeline.seconds_at(f64::from(frame)));
+    for (number, node) in (0..).zip(&mut scene.nodes) {
+        let world = pose.world(number);
+        let matrix3 = DMat3::from_cols(
+            Vec3::from(world.matrix3.x_axis).as_dvec3(),
+            Vec3::from(world.matrix3.y_axis).as_dvec3(),
+            Vec3::from(world.matrix3.z_axis).as_dvec3(),
+        );
+        let translation = Vec3::from(world.translation).as_dvec3();
+        node.local = Trs::Matrix(DAffine3 { matrix3, translation });
+        (node.parent, node.channels) = (None, Vec::new());
+    }
+}
+
+fn settings(strategy: LightStrategy, seed: u32) -> RenderSettings {
+    let small = RenderSettings { width: SIZE, height: SIZE, depth: 2, seed, ..Default::default() };
+    by(strategy, true, &small)
+}
+
+#[test]
+fn every_frame_is_the_picture_of_its_moment() {
+    let stage = carousel();
+    let set = Set::of(&stage.scene, &FRAMES);
+    assert!(set.emitters.static_count() > 0 && set.emitters.static_count() < set.emitters.len());
+    let mut pictures = Vec::new();
+    for frame in FRAMES {
+        let tree = render(&set, settings(LightStrategy::Tree, 10), frame);
+        let mut still = carousel();
+        frozen(&mut still, frame);
+        let still = Set::of(&still.scene, &[]);
+        assert_eq!(still.emitters.static_count(), still.emitters.len());
+        for (what, other) in [
+            ("uniformly", render(&set, settings(LightStrategy::Uniform, 20), frame)),
+            ("exhaustively", render(&set, settings(LightStrategy::Exhaustive, 30), frame)),
+            ("by power", render(&set, settings(LightStrategy::Power, 40), frame)),
+            ("standing still", render(&still, settings(LightStrategy::Tree, 50), 1)),
+        ] {
+            let wrong = disagreement(&tree, &other);
+            assert!(
+                wrong.is_none(),
+                "frame {frame} through the tree and {what} {}",
+                wrong.unwrap()
+            );
+        }
+        pictures.push(tree);
+    }
+    // And it does move.
+    for pair in pictures.windows(2) {
+        let apart = Estimate::of_picture(&pair[0]).distance(&Estimate::of_picture(&pair[1]));
+        assert!(apart > 10.0, "{apart}");
+    }
+}
+
+#[test]
+fn a_frame_that_the_tree_lacks_is_named() {
+    let stage = carousel();
+    let set = Set::of(&stage.scene, &FRAMES);
+    let camera = stage.scene.cameras[0].clone();
+    let settings = RenderSettings { samples: 1, ..settings(LightStrategy::Tree, 0) };
+    let delegate = RenderDelegate::new(set.scene, &set.emitters, &set.tree, camera, settings);
+    for frame in [0, 2, 26, i32::MIN] {
+        match delegate.render(frame, &()) {
+            Err(FrameError::NoSuchFrame(error)) => {
+                assert_eq!((error.frame, error.first, error.last), (frame, 1, 25));
+                assert!(error.to_string().contains("--frames"), "{error}");
+            }
+            other => panic!("frame {frame}: {:?}", other.err()),
+        }
+    }
+    assert!(delegate.render(13, &()).is_ok());
+    // Where no light moves, every frame will do.
+    let still = rooms::lambert_room();
+    still.set().render(&self::settings(LightStrategy::Tree, 0), i32::MAX);
+}
+
+/// The share of picks that find nothing, by an even grid.
+fn dead_share(tree: &FrameTree, receiver: &Receiver, picks: u32) -> f64 {
+    let nothing =
+        |i: &u32| tree.sample(receiver, (f64::from(*i) + 0.5) / f64::from(picks)).is_none();
+    f64::from((0..picks).filter(nothing).count() as u32) / f64::from(picks)
+}
+
+/// Receivers all over the room, with normals all over the sphere.
+fn receivers() -> impl Iterator<Item = Receiver> {
+    (0..40).map(|i| {
+        let t = i as f32;
+        let point = Vec3::new((1.7 * t).sin(), 0.6 + 0.6 * (0.9 * t).cos(), (2.3 * t).cos());
+        let normal = Vec3::new((0.7 * t).cos(), (1.1 * t).sin(), (1.9 * t).sin()).normalize();
+        Receiver { point, normal: if i % 8 == 7 { Vec3::ZERO } else { normal } }
+    })
+}
+
+#[test]
+fn what_stands_still_and_what_moves_share_one_probability() {
+    const PICKS: u32 = 1 << 14;
+    let stage = carousel();
+    let set = Set::of(&stage.scene, &FRAMES);
+    let (split, count) = (set.emitters.static_count(), set.emitters.len());
+    let table = set.tree.leaf_table();
+    for frame in FRAMES {
+        let tree = set.tree.at_frame(frame, &table).unwrap();
+        let (mut of_still, mut of_moving) = (0, 0);
+        for receiver in receivers() {
+            let told: Vec<f64> =
+                (0..count as u32).map(|emitter| tree.probability(&receiver, emitter)).collect();
+            let dead = dead_share(&tree, &receiver, PICKS);
+            // Every run of picks that find nothing may be off by one.
+            let sum = told.iter().sum::<f64>() + dead;
+            assert!((sum - 1.0).abs() <= 20.0 / f64::from(PICKS), "{sum}");
+            of_still += told[..split].iter().filter(|&&share| share > 0.0).count();
+            of_moving += told[split..].iter().filter(|&&share| share > 0.0).count();
+            let mut picked = vec![0u32; count];
+            for i in 0..PICKS {
+                let u = (f64::from(i) + 0.5) / f64::from(PICKS);
+                if let Some(pick) = tree.sample(&receiver, u) {
+                    let told = told[pick.emitter as usize];
+                    assert!((pick.probability - told).abs() <= 1e-12 * told);
+                    picked[pick.emitter as usize] += 1;
+                }
+            }
+            for (picks, share) in picked.into_iter().zip(&told) {
+                let off = f64::from(picks) - share * f64::from(PICKS);
+                assert!(off.abs() <= 1.0 + 1e-6, "{picks} picks, {share}");
+            }
+        }
+        assert!(of_still > split && of_moving > count - split, "{of_still} {of_moving}");
+    }
+}
+
+#[test]
+fn a_shot_of_nothing_but_moving_lights_has_no_tree_below() {
+    let mut stage = carousel();
+    let moving = stage.scene.moving_nodes();
+    stage.scene.lights.retain(|light| moving[light.node as usize]);
+    let scene = &mut stage.scene;
+    let emits = |scene: &Scene, mesh| scene.material_of(mesh).is_some_and(|m| m.emits());
+    let kept = scene.instances.clone().into_iter();
+    scene.instances = kept.filter(|i| moving[i.node as usize] || !emits(scene, i.mesh)).collect();
+    let set = Set::of(&stage.scene, &FRAMES);
+    assert_eq!((set.emitters.static_count(), set.tree.trees().len()), (0, FRAMES.len()));
+    let tree = render(&set, settings(LightStrategy::Tree, 60), 13);
+    let uniform = render(&set, settings(LightStrategy::Uniform, 70), 13);
+    assert_eq!(disagreement(&tree, &uniform), None);
+}

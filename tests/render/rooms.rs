@@ -1,0 +1,302 @@
+//! Small rooms that between them have every kind of light, material, side and hand.
+//!
+//! All are seen in the same way: from above, floor only, so that no light is in the picture and
+//! its mean is reflected light alone. A wall stands behind, a card throws a shadow.
+
+use crate::stage::{Stage, aimed, at, facing, glow, lambert, picture, scaled};
+use candelabra::scene::{
+    AlphaMode, LightKind, Material, Pixels, Shaping, Texture, TextureUse, Wrap,
+};
+use glam::{DVec3, Vec3};
+
+/// A scene, and how many bounces of it are looked at.
+pub struct Room {
+    pub name: String,
+    pub stage: Stage,
+    pub depth: u32,
+}
+
+const ABOVE: DVec3 = DVec3::new(0.0, 1.5, 0.0);
+
+fn plaster() -> Material {
+    lambert(Vec3::new(0.7, 0.6, 0.5))
+}
+
+/// The floor, of some material, and what stands on it.
+fn furnished(floor: Material) -> Stage {
+    let mut stage = Stage::default();
+    stage.quad([5.0; 2], floor, facing(DVec3::ZERO, DVec3::Y));
+    stage.quad([5.0, 3.0], plaster(), at(DVec3::new(0.0, 1.5, -1.5)));
+    let card = DVec3::new(0.3, 0.35, 0.1);
+    stage.quad([0.5, 0.4], plaster(), facing(card, card + DVec3::new(0.3, 1.0, 0.2)));
+    stage.look(DVec3::new(0.0, 1.6, 2.2), DVec3::new(0.0, 0.0, -0.1), 0.7);
+    stage
+}
+
+fn room(name: &str, floor: Material, lights: impl FnOnce(&mut Stage)) -> Room {
+    let mut stage = furnished(floor);
+    lights(&mut stage);
+    Room { name: name.into(), stage, depth: 2 }
+}
+
+/// A panel of light that is one quad.
+fn panel(stage: &mut Stage, side: f32, material: Material, place: DVec3, target: DVec3) {
+    stage.quad([side; 2], material, facing(place, target));
+}
+
+fn sphere(radiance: Vec3, radius: f32, shaping: Option<Shaping>) -> LightKind {
+    LightKind::Sphere { radiance_nits: radiance, radius, shaping }
+}
+
+const USD: Shaping =
+    Shaping::Usd { cone_rad: 0.9, softness: 0.4, focus: 3.0, focus_tint: [0.5, 0.1, 0.0] };
+const KHR: Shaping = Shaping::Khr { inner_rad: 0.3, outer_rad: 0.8 };
+
+/// Panels around the floor, some of which turn their backs to it.
+fn mesh_lights(stage: &mut Stage, double_sided: bool) {
+    for i in 0..6 {
+        let angle = f64::from(i);
+        let place = DVec3::new(1.4 * angle.cos(), 0.8 + 0.2 * angle, 1.4 * angle.sin());
+        let target = place + DVec3::new(-angle.sin(), (2.0 * angle).cos(), 0.5);
+        let color = Vec3::new(1.0 + i as f32, 3.0, 6.0 - i as f32);
+        panel(stage, 0.3, Material { double_sided, ..glow(color) }, place, target);
+    }
+    stage.ball(0.15, 2, glow(Vec3::new(2.0, 4.0, 1.0)), at(DVec3::new(-0.8, 0.9, 0.6)));
+}
+
+/// A panel of four texels' squares, of which half are black, and triangles all in the black.
+fn textured_light(stage: &mut Stage) {
+    let checks = picture([4, 4], true, |x, y| {
+        if (x / 2 + y / 2) % 2 == 0 { [0.0; 3] } else { [1.0, 0.4 * x as f32, 0.3 * y as f32] }
+    });
+    let used = stage.texture(checks);
+    let material =
+        Material { emission_texture: used, base_color: Vec3::ONE, ..glow(Vec3::splat(9.0)) };
+    stage.quad([1.2, 0.8], material.clone(), facing(ABOVE, DVec3::ZERO));
+    // Every facet of this ball takes one texel or a few of them.
+    let place = at(DVec3::new(-0.9, 0.7, 0.3));
+    stage.ball(0.25, 3, material, place);
+    let mesh = stage.scene.meshes.last_mut().unwrap();
+    let uvs = mesh.positions.iter().map(|p| 2.0 * p.truncate() + 0.5).collect();
+    mesh.uv_sets = vec![uvs];
+}
+
+fn point(stage: &mut Stage) {
+    let intensity_cd = Vec3::new(2.0, 1.5, 1.0);
+    stage.light(LightKind::Point { intensity_cd }, at(DVec3::new(-0.4, 0.9, 0.5)));
+}
+
+fn points_with_ranges(stage: &mut Stage) {
+    for (x, range) in [(-0.5, 0.9), (0.5, 1.6)] {
+        let kind = LightKind::Point { intensity_cd: Vec3::new(1.0, 2.0, 1.0) };
+        stage.light(kind, at(DVec3::new(x, 0.6, 0.3))).range_m = Some(range);
+    }
+}
+
+fn spot(stage: &mut Stage, shaping: Shaping) {
+    for x in [-0.6, 0.7] {
+        let kind = LightKind::Spot { intensity_cd: Vec3::new(5.0, 4.0, 3.0), shaping };
+        stage.light(kind, aimed(DVec3::new(x, 1.2, 0.4), DVec3::new(0.3 * x, 0.0, 0.0)));
+    }
+    // One that aims away from everything.
+    let kind = LightKind::Spot { intensity_cd: Vec3::splat(50.0), shaping };
+    stage.light(kind, aimed(ABOVE, 2.0 * ABOVE));
+}
+
+fn spheres(stage: &mut Stage, shaping: Option<Shaping>) {
+    let kind = sphere(Vec3::new(20.0, 15.0, 10.0), 0.1, shaping);
+    stage.light(kind, aimed(DVec3::new(0.6, 0.8, 0.4), DVec3::ZERO));
+    let kind = sphere(Vec3::new(1.0, 2.0, 4.0), 0.4, shaping);
+    stage.light(kind, aimed(DVec3::new(-1.3, 0.9, -0.2), DVec3::ZERO));
+}
+
+fn sun(stage: &mut Stage, angle_rad: f32) {
+    let kind = LightKind::Distant { irradiance_lux: Vec3::new(3.0, 2.5, 2.0), angle_rad };
+    stage.light(kind, aimed(DVec3::ZERO, DVec3::new(-0.5, -1.0, -0.4)));
+    // One below the floor.
+    let kind = LightKind::Distant { irradiance_lux: Vec3::splat(9.0), angle_rad };
+    stage.light(kind, aimed(DVec3::ZERO, DVec3::Y));
+}
+
+fn dome(stage: &mut Stage) {
+    let radiance_nits = Vec3::new(0.6, 0.8, 1.0);
+    stage.light(LightKind::Dome { radiance_nits, texture: None }, at(DVec3::ZERO));
+}
+
+fn textured_dome(stage: &mut Stage) {
+    // A bright spot, a gradient, and black below.
+    let sky = picture([16, 8], true, |x, y| match (x, y) {
+        (4..6, 2) => [40.0, 30.0, 20.0],
+        (_, 0..4) => [0.2, 0.3, 0.1 * x as f32],
+        _ => [0.0; 3],
+    });
+    let texture = stage.texture(sky).map(|used| used.texture);
+    let kind = LightKind::Dome { radiance_nits: Vec3::ONE, texture };
+    stage.light(kind, facing(DVec3::ZERO, DVec3::new(1.0, 0.2, 0.5)));
+}
+
+pub fn of_every_light() -> Vec<Room> {
+    let on_plaster = |name: &str, lights: &dyn Fn(&mut Stage)| room(name, plaster(), lights);
+    vec![
+        on_plaster("mesh lights", &|stage| mesh_lights(stage, false)),
+        on_plaster("double-sided mesh lights", &|stage| mesh_lights(stage, true)),
+        on_plaster("textured mesh lights", &textured_light),
+        on_plaster("shaped mesh lights", &|stage| {
+            for (x, shaping) in [(-0.6, USD), (0.6, KHR)] {
+                let place = aimed(DVec3::new(x, 1.2, 0.3), DVec3::new(0.0, 0.0, 0.2));
+                let material = Material { double_sided: true, ..glow(Vec3::new(9.0, 8.0, 7.0)) };
+                stage.quad([0.5; 2], material, place).shaping = Some(shaping);
+            }
+        }),
+        on_plaster("spheres", &|stage| spheres(stage, None)),
+        on_plaster("spheres with USD's shaping", &|stage| spheres(stage, Some(USD))),
+        on_plaster("spheres with glTF's shaping", &|stage| spheres(stage, Some(KHR))),
+        on_plaster("a point", &point),
+        on_plaster("points with ranges", &points_with_ranges),
+        on_plaster("glTF's spots", &|stage| spot(stage, KHR)),
+        on_plaster("USD's spots", &|stage| spot(stage, USD)),
+        on_plaster("suns without size", &|stage| sun(stage, 0.0)),
+        on_plaster("suns of some size", &|stage| sun(stage, 0.3)),
+        on_plaster("a constant dome", &dome),
+        on_plaster("a textured dome", &textured_dome),
+        on_plaster("all lights together", &all_lights),
+    ]
+}
+
+/// One plain room, lit by a few lights.
+pub fn lambert_room() -> Stage {
+    room("Lambert", plaster(), some_lights).stage
+}
+
+pub fn all_lights(stage: &mut Stage) {
+    mesh_lights(stage, false);
+    textured_light(stage);
+    spheres(stage, Some(USD));
+    point(stage);
+    points_with_ranges(stage);
+    spot(stage, KHR);
+    sun(stage, 0.3);
+    dome(stage);
+    textured_dome(stage);
+}
+
+/// One light of each way of being found: a triangle near and far, a sphere, a point, a dome.
+fn some_lights(stage: &mut Stage) {
+    panel(stage, 0.6, glow(Vec3::new(6.0, 5.0, 4.0)), DVec3::new(-0.9, 1.0, 0.4), DVec3::ZERO);
+    stage.light(sphere(Vec3::splat(12.0), 0.15, None), at(DVec3::new(0.9, 0.7, -0.3)));
+    stage.light(LightKind::Point { intensity_cd: Vec3::ONE }, at(DVec3::new(0.0, 1.2, 0.8)));
+    let radiance_nits = Vec3::new(0.2, 0.3, 0.4);
+    stage.light(LightKind::Dome { radiance_nits, texture: None }, at(DVec3::ZERO));
+}
+
+/// Bumps in the manner of a quilt.
+fn bumps(stage: &mut Stage) -> Option<TextureUse> {
+    let texel = |i: usize| {
+        let (x, y) = ((i % 8) as f32, (i / 8) as f32);
+        let normal = Vec3::new(0.8 * (x * 0.8).sin(), 0.8 * (y * 0.8).cos(), 1.0).normalize();
+        let [r, g, b] = (normal * 127.5 + 127.5).to_array().map(|code| code.round() as u8);
+        [r, g, b, 255]
+    };
+    stage.texture(Texture {
+        name: "bumps".into(),
+        width: 8,
+        height: 8,
+        pixels: Pixels::Linear8((0..64).map(texel).collect()),
+        wrap: [Wrap::Repeat; 2],
+        bilinear: true,
+    })
+}
+
+/// A picture with holes: alpha goes from nothing to all.
+fn holes(stage: &mut Stage) -> Option<TextureUse> {
+    let texel = |i: usize| [200, 150, 100, (i % 8 * 36) as u8];
+    stage.texture(Texture {
+        name: "holes".into(),
+        width: 8,
+        height: 8,
+        pixels: Pixels::Srgb8((0..64).map(texel).collect()),
+        wrap: [Wrap::Repeat; 2],
+        bilinear: true,
+    })
+}
+
+/// Cut-outs above the floor, one of which shines, and cut-out ground.
+fn cut_outs(stage: &mut Stage, alpha_mode: AlphaMode) {
+    some_lights(stage);
+    let base_color_texture = holes(stage);
+    let cut = Material { base_color_texture, alpha_mode, ..plaster() };
+    stage.quad([2.0; 2], cut.clone(), facing(DVec3::Y * 0.5, DVec3::Y));
+    let shining = Material { double_sided: true, emission_nits: Vec3::splat(4.0), ..cut };
+    let place = DVec3::new(-0.5, 0.8, -0.4);
+    stage.quad([0.6; 2], shining, facing(place, DVec3::ZERO));
+}
+
+pub fn of_every_material() -> Vec<Room> {
+    let metal = |roughness| Material {
+        base_color: Vec3::new(0.9, 0.7, 0.4),
+        metallic: 1.0,
+        roughness,
+        ..Default::default()
+    };
+    let varnish = Material { roughness: 0.4, ..Material { specular: 1.0, ..plaster() } };
+    vec![
+        Room { name: "Lambert".into(), stage: lambert_room(), depth: 2 },
+        room("rough metal", metal(0.8), some_lights),
+        room("smooth metal", metal(0.4), some_lights),
+        room("varnish", varnish, some_lights),
+        room("masked cut-outs", plaster(), |stage| cut_outs(stage, AlphaMode::Mask(0.5))),
+        room("blended cut-outs", plaster(), |stage| cut_outs(stage, AlphaMode::Blend)),
+        room("a normal map", plaster(), |stage| {
+            some_lights(stage);
+            let normal_texture = bumps(stage);
+            let floor = Material { normal_texture, roughness: 0.5, specular: 1.0, ..plaster() };
+            stage.scene.materials[0] = floor;
+        }),
+    ]
+}
+
+/// Scales that mirror: in one axis, in all three.
+const MIRRORS: [DVec3; 3] =
+    [DVec3::new(-1.0, 1.0, 1.0), DVec3::new(1.0, 1.0, -1.0), DVec3::splat(-1.0)];
+
+pub fn of_every_side() -> Vec<Room> {
+    let mut rooms = vec![
+        room("a floor seen from its back", plaster(), |stage| {
+            some_lights(stage);
+            let place = facing(DVec3::ZERO, -DVec3::Y);
+            stage.scene.nodes[0].local = place;
+        }),
+        room("light through a crack from below", plaster(), |stage| {
+            // Lights under a floor of two halves with a gap, which light what hangs above it.
+            some_lights(stage);
+            stage.quad([3.0; 2], glow(Vec3::splat(5.0)), facing(-DVec3::Y, DVec3::ZERO));
+            let half = scaled(facing(DVec3::X * 1.3, DVec3::new(1.3, 1.0, 0.0)), DVec3::splat(0.5));
+            stage.scene.nodes[0].local = half;
+        }),
+        room("panels that turn their backs", plaster(), |stage| {
+            some_lights(stage);
+            let away = DVec3::new(-0.2, 2.0, 0.0);
+            panel(stage, 0.8, glow(Vec3::splat(30.0)), DVec3::new(-0.2, 0.7, 0.3), away);
+            panel(stage, 0.3, glow(Vec3::splat(3.0)), DVec3::new(0.2, 1.7, 0.3), DVec3::ZERO);
+        }),
+    ];
+    for mirror in MIRRORS {
+        let name = format!("mirrored by {mirror}");
+        rooms.push(room(&name, plaster(), |stage| {
+            some_lights(stage);
+            let normal_texture = bumps(stage);
+            stage.scene.materials[0].normal_texture = normal_texture;
+            stage.ball(0.2, 2, glow(Vec3::splat(2.0)), at(DVec3::new(0.2, 0.9, 0.7)));
+            let place = aimed(DVec3::new(0.5, 1.4, 0.2), DVec3::ZERO);
+            stage.light(sphere(Vec3::splat(9.0), 0.1, Some(USD)), place);
+            // Everything but the camera, the last light's aim included.
+            let camera = stage.scene.cameras[0].node as usize;
+            for (number, node) in stage.scene.nodes.iter_mut().enumerate() {
+                if number != camera {
+                    node.local = scaled(node.local, mirror);
+                }
+            }
+        }));
+    }
+    rooms
+}
