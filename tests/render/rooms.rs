@@ -5,7 +5,7 @@
 
 use crate::stage::{Stage, aimed, at, facing, glow, lambert, picture, scaled};
 use candelabra::scene::{
-    AlphaMode, LightKind, Material, Pixels, Shaping, Texture, TextureUse, Wrap,
+    AlphaMode, LightKind, Material, Node, Pixels, Shaping, Texture, TextureUse, Wrap,
 };
 use glam::{DVec3, Vec3};
 
@@ -155,6 +155,12 @@ pub fn of_every_light() -> Vec<Room> {
         on_plaster("points with ranges", &points_with_ranges),
         on_plaster("glTF's spots", &|stage| spot(stage, KHR)),
         on_plaster("USD's spots", &|stage| spot(stage, USD)),
+        on_plaster("spots with hard edges", &|stage| {
+            spot(stage, Shaping::Khr { inner_rad: 0.39, outer_rad: 0.4 });
+            let hard =
+                Shaping::Usd { cone_rad: 0.5, softness: 0.0, focus: 0.0, focus_tint: [0.0; 3] };
+            spheres(stage, Some(hard));
+        }),
         on_plaster("suns without size", &|stage| sun(stage, 0.0)),
         on_plaster("suns of some size", &|stage| sun(stage, 0.3)),
         on_plaster("a constant dome", &dome),
@@ -255,10 +261,6 @@ pub fn of_every_material() -> Vec<Room> {
     ]
 }
 
-/// Scales that mirror: in one axis, in all three.
-const MIRRORS: [DVec3; 3] =
-    [DVec3::new(-1.0, 1.0, 1.0), DVec3::new(1.0, 1.0, -1.0), DVec3::splat(-1.0)];
-
 pub fn of_every_side() -> Vec<Room> {
     let mut rooms = vec![
         room("a floor seen from its back", plaster(), |stage| {
@@ -281,22 +283,34 @@ pub fn of_every_side() -> Vec<Room> {
         }),
     ];
     for mirror in MIRRORS {
-        let name = format!("mirrored by {mirror}");
-        rooms.push(room(&name, plaster(), |stage| {
-            some_lights(stage);
-            let normal_texture = bumps(stage);
-            stage.scene.materials[0].normal_texture = normal_texture;
-            stage.ball(0.2, 2, glow(Vec3::splat(2.0)), at(DVec3::new(0.2, 0.9, 0.7)));
-            let place = aimed(DVec3::new(0.5, 1.4, 0.2), DVec3::ZERO);
-            stage.light(sphere(Vec3::splat(9.0), 0.1, Some(USD)), place);
-            // Everything but the camera, the last light's aim included.
-            let camera = stage.scene.cameras[0].node as usize;
-            for (number, node) in stage.scene.nodes.iter_mut().enumerate() {
-                if number != camera {
-                    node.local = scaled(node.local, mirror);
-                }
-            }
-        }));
+        rooms.push(Room {
+            name: format!("mirrored by {mirror}"),
+            stage: mirrored(mirror),
+            depth: 2,
+        });
     }
     rooms
+}
+
+/// Scales that mirror: in one axis, in all three.
+pub const MIRRORS: [DVec3; 3] =
+    [DVec3::new(-1.0, 1.0, 1.0), DVec3::new(1.0, 1.0, -1.0), DVec3::splat(-1.0)];
+
+/// A room of things that have a hand, camera included, all under a node that mirrors it.
+pub fn mirrored(mirror: DVec3) -> Stage {
+    let mut stage = lambert_room();
+    let normal_texture = bumps(&mut stage);
+    stage.scene.materials[0].normal_texture = normal_texture;
+    stage.ball(0.2, 2, glow(Vec3::splat(2.0)), at(DVec3::new(0.2, 0.9, 0.7)));
+    let place = aimed(DVec3::new(0.5, 1.4, 0.2), DVec3::ZERO);
+    stage.light(sphere(Vec3::splat(9.0), 0.1, Some(USD)), place);
+    // A parent stands before its children.
+    let parent = Node::fixed("/mirror", None, scaled(at(DVec3::ZERO), mirror));
+    let scene = &mut stage.scene;
+    scene.nodes.insert(0, parent);
+    scene.nodes[1..].iter_mut().for_each(|node| node.parent = Some(0));
+    scene.instances.iter_mut().for_each(|instance| instance.node += 1);
+    scene.lights.iter_mut().for_each(|light| light.node += 1);
+    scene.cameras.iter_mut().for_each(|camera| camera.node += 1);
+    stage
 }

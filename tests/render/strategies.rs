@@ -9,8 +9,9 @@
 use crate::rooms::{self, Room};
 use crate::stage::{Set, by};
 use crate::statistics::{Estimate, blocks};
-use candelabra::render::buffers::RenderBuffers;
+use candelabra::render::buffers::{Pixel, RenderBuffers};
 use candelabra::render::{LightStrategy, RenderSettings};
+use glam::DVec3;
 
 /// Pixels along an edge.
 pub const SIZE: u32 = 16;
@@ -110,6 +111,24 @@ fn under_every_kind_of_light() {
 #[test]
 fn on_every_material() {
     assert_all(rooms::of_every_material());
+}
+
+/// The picture of a mirrored scene is the mirrored picture: windings, normal maps, aims.
+#[test]
+fn in_the_mirror() {
+    let settings = RenderSettings { width: SIZE, height: SIZE, depth: 2, ..Default::default() };
+    let picture = |mirror, seed| {
+        let stage = rooms::mirrored(mirror);
+        render(&stage.set(), RenderSettings { seed, ..settings.clone() }, 1)
+    };
+    let expected = picture(DVec3::ONE, 100);
+    for (seed, mirror) in (200..).zip(rooms::MIRRORS) {
+        let mut seen = picture(mirror, seed);
+        // A camera has no hand: it turns right and left around.
+        seen.pixels_mut().chunks_mut(SIZE as usize).for_each(<[Pixel]>::reverse);
+        let wrong = disagreement(&expected, &seen);
+        assert!(wrong.is_none(), "a room and its mirror by {mirror} {}", wrong.unwrap());
+    }
 }
 
 #[test]
