@@ -7,9 +7,11 @@ python=.venv/bin/python
 environment() {
     stamp=$(cat "$@" | cksum)
     name=.venv/$(echo "$*" | tr -c 'a-z-\n' '-').stamp
-    if [ ! -x "$python" ]; then
+    if ! "$python" -m pip --version >/dev/null 2>&1; then
         echo "== making a Python environment in .venv"
+        rm -rf .venv
         python3 -m venv .venv || {
+            rm -rf .venv
             echo "python3 cannot make a virtual environment; on Debian install python3-venv" >&2
             exit 1
         }

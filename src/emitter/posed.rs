@@ -329,10 +329,8 @@ impl<'a> PosedEmitters<'a> {
             LightKind::Sphere { radius, .. } => radius,
             _ => 0.0,
         };
-        WorldSphere {
-            center: world.translation.into(),
-            radius: radius * world.matrix3.x_axis.length(),
-        }
+        let radius = self.pose.world_radius(light.node, radius);
+        WorldSphere { center: world.translation.into(), radius }
     }
 
     /// Where a node aims: its -Z, unit, world space.

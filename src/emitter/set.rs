@@ -1,10 +1,10 @@
 //! Which emitters a scene has, in canonical order, and how to find one again from a hit.
 
-use super::texels::mean_over_triangle;
+use super::texels::TexelMeans;
 use crate::math::color::{Rgb, luminance};
 use crate::scene::{LightKind, Material, Mesh, Scene};
-use glam::Vec2;
 use rayon::prelude::*;
+use std::sync::OnceLock;
 
 /// What the tree picks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -64,10 +64,12 @@ impl Emitters {
     /// black are none.
     pub fn collect(scene: &Scene) -> Emitters {
         let moving = scene.moving_nodes();
+        let whole_means: Vec<OnceLock<Rgb>> =
+            scene.textures.iter().map(|_| OnceLock::new()).collect();
         let mesh_light = |(i, instance): (usize, &crate::scene::Instance)| {
             let mesh = &scene.meshes[instance.mesh as usize];
             let material = scene.material_of(instance.mesh).filter(|material| material.emits())?;
-            let found = emitting_triangles(scene, mesh, material);
+            let found = emitting_triangles(scene, mesh, material, &whole_means);
             (found.count > 0).then(|| LightEntry {
                 path: instance.path.clone(),
                 source: LightSource::Instance(i as u32),
@@ -197,17 +199,26 @@ struct Emitting {
     texture_means: Option<Vec<Rgb>>,
 }
 
-fn emitting_triangles(scene: &Scene, mesh: &Mesh, material: &Material) -> Emitting {
+fn emitting_triangles(
+    scene: &Scene,
+    mesh: &Mesh,
+    material: &Material,
+    whole_means: &[OnceLock<Rgb>],
+) -> Emitting {
     let textured = material
         .emission_texture
         .filter(|usage| mesh.uv_sets.get(usage.uv_set as usize).is_some_and(|set| !set.is_empty()));
-    let mean_of = |triangle: &[u32; 3]| match textured {
+    let means = textured.map(|usage| {
+        let uvs = &mesh.uv_sets[usage.uv_set as usize];
+        let on_texture = |triangle: &[u32; 3]| triangle.map(|corner| uvs[corner as usize]);
+        let (texture, whole) =
+            (&scene.textures[usage.texture as usize], &whole_means[usage.texture as usize]);
+        let all = mesh.triangles.iter().map(on_texture);
+        (TexelMeans::new(texture, usage, all, whole), on_texture)
+    });
+    let mean_of = |triangle: &[u32; 3]| match &means {
         None => Rgb::ONE,
-        Some(usage) => {
-            let uvs = &mesh.uv_sets[usage.uv_set as usize];
-            let corners: [Vec2; 3] = triangle.map(|corner| uvs[corner as usize]);
-            mean_over_triangle(&scene.textures[usage.texture as usize], &usage, corners)
-        }
+        Some((means, on_texture)) => means.over(on_texture(triangle)),
     };
     let emission = |(triangle, corners): (usize, &[u32; 3])| {
         let [a, b, c] = corners.map(|corner| mesh.positions[corner as usize].as_dvec3());

@@ -3,24 +3,78 @@
 use crate::math::color::Rgb;
 use crate::scene::{Texture, TextureUse};
 use glam::{DVec2, Vec2};
+use std::sync::OnceLock;
 
-/// Triangles that cover more texels than this take the mean of the whole texture.
+/// Texels that are looked at for one triangle; of one that covers more the whole texture's mean is
+/// taken...
 const MOST_TEXELS: f64 = 4_000_000.0;
+/// ...and for one of a mesh whose triangles together cover more than [`MOST_TOGETHER`].
+const FEW_TEXELS: f64 = 16_384.0;
+const MOST_TOGETHER: f64 = 200_000_000.0;
 
-/// The mean of the texels that bilinear lookups inside a triangle can reach. Exactly zero if and
-/// only if all of these are black, so a triangle with mean zero emits nothing.
-pub fn mean_over_triangle(texture: &Texture, usage: &TextureUse, uvs: [Vec2; 3]) -> Rgb {
-    let size = DVec2::new(texture.width.into(), texture.height.into());
-    // Texel (x, y) has its centre at whole coordinates (x, y) here.
-    let corners = uvs.map(|uv| usage.map(uv).as_dvec2() * size - 0.5);
-    let min = (corners[0].min(corners[1]).min(corners[2]) - 1.0).ceil();
-    let max = (corners[0].max(corners[1]).max(corners[2]) + 1.0).floor();
-    let spans = max - min + 1.0;
-    let covered = spans.x * spans.y;
-    if covered.is_nan() || covered > MOST_TEXELS {
-        return mean_of(texture, texels(DVec2::ZERO, size - 1.0));
+/// A texture's means over the triangles of one mesh.
+pub struct TexelMeans<'a> {
+    texture: &'a Texture,
+    usage: TextureUse,
+    most_texels: f64,
+    whole: &'a OnceLock<Rgb>,
+}
+
+impl<'a> TexelMeans<'a> {
+    /// Looks at how much the triangles cover, so that no mesh takes for ever. `whole` keeps the
+    /// mean of all texels, once it has been needed.
+    pub fn new(
+        texture: &'a Texture,
+        usage: TextureUse,
+        triangles: impl Iterator<Item = [Vec2; 3]>,
+        whole: &'a OnceLock<Rgb>,
+    ) -> TexelMeans<'a> {
+        let covered = |uvs| Footprint::of(texture, &usage, uvs).texels.min(MOST_TEXELS);
+        let together: f64 = triangles.map(covered).sum();
+        let most_texels = if together > MOST_TOGETHER { FEW_TEXELS } else { MOST_TEXELS };
+        TexelMeans { texture, usage, most_texels, whole }
     }
-    mean_of(texture, texels(min, max).filter(|&texel| touches(&corners, texel)))
+
+    /// The mean of the texels that bilinear lookups inside a triangle can reach. Zero only if all of
+    /// these are black: a triangle with mean zero emits nothing.
+    pub fn over(&self, uvs: [Vec2; 3]) -> Rgb {
+        let footprint = Footprint::of(self.texture, &self.usage, uvs);
+        if footprint.texels <= self.most_texels {
+            let all = texels(footprint.min, footprint.max);
+            return mean_of(self.texture, all.filter(|&texel| touches(&footprint.corners, texel)));
+        }
+        *self.whole.get_or_init(|| {
+            let size = DVec2::new(self.texture.width.into(), self.texture.height.into());
+            mean_of(self.texture, texels(DVec2::ZERO, size - 1.0))
+        })
+    }
+}
+
+/// A triangle on a texture: texel (x, y) has its centre at whole coordinates (x, y).
+struct Footprint {
+    corners: [DVec2; 3],
+    /// First and last texel that a lookup can reach.
+    min: DVec2,
+    max: DVec2,
+    /// How many that rectangle has; infinite for coordinates that are not numbers.
+    texels: f64,
+}
+
+impl Footprint {
+    fn of(texture: &Texture, usage: &TextureUse, uvs: [Vec2; 3]) -> Footprint {
+        let size = DVec2::new(texture.width.into(), texture.height.into());
+        let corners = uvs.map(|uv| usage.map(uv).as_dvec2() * size - 0.5);
+        let min = (corners[0].min(corners[1]).min(corners[2]) - 1.0).ceil();
+        let max = (corners[0].max(corners[1]).max(corners[2]) + 1.0).floor();
+        let spans = max - min + 1.0;
+        let texels = spans.x * spans.y;
+        Footprint {
+            corners,
+            min,
+            max,
+            texels: if texels.is_nan() { f64::INFINITY } else { texels },
+        }
+    }
 }
 
 /// All texels of a rectangle, both corners included.
@@ -61,6 +115,10 @@ mod tests {
 
     const USE: TextureUse = TextureUse { texture: 0, uv_set: 0, transform: None };
 
+    fn mean_over_triangle(texture: &Texture, usage: &TextureUse, uvs: [Vec2; 3]) -> Rgb {
+        TexelMeans::new(texture, *usage, std::iter::once(uvs), &OnceLock::new()).over(uvs)
+    }
+
     /// 64 x 64, white where `lit` says so.
     fn texture(lit: impl Fn(usize, usize) -> bool) -> Texture {
         let texel = |i: usize| [if lit(i % 64, i / 64) { 255 } else { 0 }; 4];
@@ -98,6 +156,16 @@ mod tests {
         assert!((mean_over_triangle(&half, &USE, across).x - 0.5).abs() < 0.02);
         let point = [Vec2::splat(0.75); 3];
         assert_eq!(mean_over_triangle(&half, &USE, point).x, 1.0);
+    }
+
+    #[test]
+    fn many_tiled_triangles_take_the_whole_mean() {
+        let half = texture(|x, _| x >= 32);
+        let tiled = [Vec2::ZERO, Vec2::new(30.0, 0.0), Vec2::new(0.0, 30.0)];
+        let whole = OnceLock::new();
+        let many = (0..100_000).map(|_| tiled);
+        let means = TexelMeans::new(&half, USE, many, &whole);
+        assert!((0..100_000).all(|_| (means.over(tiled).x - 0.5).abs() < 1e-6));
     }
 
     #[test]

@@ -51,13 +51,12 @@ impl<D: AsRef<[u8]>> LightTree<D> {
     pub fn leaf_table(&self) -> LeafTable {
         let most = self.groups().len() * WIDTH;
         let mut slot_of = vec![NO_SLOT; self.static_emitter_count().min(most)];
-        for tree in self.trees() {
-            for (slot, link) in self.links(tree) {
-                if let Link::Emitter(emitter) = link
-                    && let Some(entry) = slot_of.get_mut(emitter as usize)
-                {
-                    *entry = slot;
-                }
+        // The first tree holds what stands still, if anything does.
+        for (slot, link) in self.trees().first().into_iter().flat_map(|tree| self.links(tree)) {
+            if let Link::Emitter(emitter) = link
+                && let Some(entry) = slot_of.get_mut(emitter as usize)
+            {
+                *entry = slot;
             }
         }
         LeafTable { slot_of }

@@ -45,6 +45,11 @@ impl<D: AsRef<[u8]>> LightTree<D> {
         })
     }
 
+    /// The bytes of the file.
+    pub fn into_bytes(self) -> D {
+        self.container.into_bytes()
+    }
+
     /// The fingerprint of the content the trees were built from.
     pub fn fingerprint(&self) -> [u8; 32] {
         self.container.fingerprint()

@@ -36,13 +36,10 @@ impl<D: AsRef<[u8]> + Sync> LightTree<D> {
             self.verify_row(row, tree, groups)?;
             groups += u64::from(tree.group_count);
             self.verify_groups(row, tree, &seen)?;
+            self.verify_contents(row, tree, static_emitters)?;
         }
         if groups != self.groups().len() as u64 {
             return fail(records::TREES, "the trees do not use all groups".into());
-        }
-        let lost = seen[..static_emitters].iter().position(|row| row.load(Ordering::Relaxed) == 0);
-        if let Some(lost) = lost {
-            return fail(records::GROUPS, format!("emitter {lost} is in no tree"));
         }
         self.verify_frames()
     }
@@ -123,6 +120,48 @@ impl<D: AsRef<[u8]> + Sync> LightTree<D> {
             != tree.leaf_count as usize
         {
             return fail(records::TREES, format!("row {row}: it has another number of leaves"));
+        }
+        Ok(())
+    }
+
+    /// A tree holds either all that stands still, and is the first; or all that moves, and the tree
+    /// of what stands still as one leaf. (That no emitter is there twice is known by now.)
+    fn verify_contents(&self, row: usize, tree: &TreeRow, static_emitters: usize) -> Checked {
+        let moving = self.emitter_count() - static_emitters;
+        let is_static = row == 0 && static_emitters > 0;
+        let (mut wanted, mut below) = (0, 0);
+        for node in self.groups_of(tree).iter().flat_map(Group::nodes) {
+            match node.link() {
+                Link::Emitter(emitter) => {
+                    wanted +=
+                        usize::from((emitter as usize) < static_emitters) ^ usize::from(!is_static);
+                }
+                Link::Tree(stands_for) => {
+                    below += 1;
+                    let root = &self.trees()[stands_for as usize].root;
+                    let off = f64::from(root.energy()) - f64::from(node.energy());
+                    let sticks_out = node.uncontained(root).is_some();
+                    if stands_for != 0
+                        || sticks_out
+                        || off.abs() > ENERGY_TOLERANCE * f64::from(root.energy())
+                    {
+                        return fail(
+                            records::GROUPS,
+                            format!("tree {row}: a leaf is not the tree it stands for"),
+                        );
+                    }
+                }
+                Link::Inner(_) | Link::Nothing => {}
+            }
+        }
+        let expected = if is_static {
+            (static_emitters, 0)
+        } else {
+            (moving, usize::from(static_emitters > 0))
+        };
+        if (wanted, below) != expected || tree.leaf_count as usize != wanted + below {
+            let rule = format!("row {row}: it does not hold just the emitters that it should");
+            return fail(records::TREES, rule);
         }
         Ok(())
     }

@@ -16,28 +16,28 @@ pub type OpenedTree = LightTree<Mmap>;
 #[derive(Debug, thiserror::Error)]
 pub enum TreeError {
     /// The file cannot be read.
-    #[error("{}: {source}", path.display())]
+    #[error("{}: {cause}", path.display())]
     Io {
         /// The file.
         path: PathBuf,
         /// Why not.
-        source: std::io::Error,
+        cause: std::io::Error,
     },
     /// The file is not what the format says.
-    #[error("{}: {source}", path.display())]
+    #[error("{}: {cause}", path.display())]
     Broken {
         /// The file.
         path: PathBuf,
         /// The rule that is broken.
-        source: StoreError,
+        cause: StoreError,
     },
     /// The scene has changed since.
-    #[error("{}: {source}", path.display())]
+    #[error("{}: {cause}", path.display())]
     Stale {
         /// The file.
         path: PathBuf,
         /// What changed.
-        source: StaleTree,
+        cause: StaleTree,
     },
     /// The scene has a light that no tree can hold.
     #[error(transparent)]
@@ -49,8 +49,8 @@ pub enum TreeError {
 /// # Errors
 /// If the file cannot be read or breaks a rule.
 pub fn open_tree(path: &Path, verify: bool) -> Result<OpenedTree, TreeError> {
-    let map = store::map(path).map_err(|source| TreeError::Io { path: path.into(), source })?;
-    let broken = |source| TreeError::Broken { path: path.into(), source };
+    let map = store::map(path).map_err(|cause| TreeError::Io { path: path.into(), cause })?;
+    let broken = |cause| TreeError::Broken { path: path.into(), cause };
     let tree = LightTree::open(map).map_err(broken)?;
     if verify {
         tree.verify().map_err(broken)?;
@@ -114,7 +114,7 @@ pub fn check_fresh<D: AsRef<[u8]>>(
     let frames: Vec<i32> = tree.frames().iter().map(|row| row.frame).collect();
     let Survey { lights, fingerprint, .. } = survey(scene, emitters, &frames)?;
     if fingerprint != tree.fingerprint() {
-        return Err(TreeError::Stale { path: path.into(), source: compare(tree, &lights) });
+        return Err(TreeError::Stale { path: path.into(), cause: compare(tree, &lights) });
     }
     // Nobody may have verified the tree: its list of lights is not under the header's checksum.
     let agrees = tree.emitter_count() == emitters.len()
@@ -122,8 +122,8 @@ pub fn check_fresh<D: AsRef<[u8]>>(
     if agrees {
         return Ok(());
     }
-    let source = StoreError::Checksum { part: "the list of lights".into() };
-    Err(TreeError::Broken { path: path.into(), source })
+    let cause = StoreError::Checksum { part: "the list of lights".into() };
+    Err(TreeError::Broken { path: path.into(), cause })
 }
 
 fn compare<D: AsRef<[u8]>>(tree: &LightTree<D>, now: &[LightSummary]) -> StaleTree {

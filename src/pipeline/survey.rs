@@ -34,9 +34,32 @@ pub fn survey(scene: &Scene, emitters: &Emitters, frames: &[i32]) -> Result<Surv
             Ok((frame, PosedEmitters { scene, emitters, pose: &pose }.bounds(true)?))
         })
         .collect::<Result<Vec<_>, LightOverflow>>()?;
+    check_total(emitters, &fixed, &moving)?;
     let lights = summaries(emitters, &fixed, &moving);
     let fingerprint = whole(&lights, &moving);
     Ok(Survey { fixed, moving, lights, fingerprint })
+}
+
+/// Clusters hold the sum of their energies: that of a whole frame must be a number too.
+fn check_total(
+    emitters: &Emitters,
+    fixed: &[LightBounds],
+    moving: &[(i32, Vec<LightBounds>)],
+) -> Result<(), LightOverflow> {
+    let sum = |bounds: &[LightBounds]| bounds.iter().map(|b| f64::from(b.energy)).sum::<f64>();
+    let most = moving.iter().map(|(_, bounds)| sum(bounds)).fold(0.0, f64::max);
+    // Roundings on the way up may add to it.
+    if sum(fixed) + most <= f64::from(f32::MAX) * 0.99 {
+        return Ok(());
+    }
+    let numbered = |first: u32, bounds: &[LightBounds]| {
+        (first..).zip(bounds.iter().map(|b| b.energy)).collect::<Vec<_>>()
+    };
+    let mut all = numbered(0, fixed);
+    all.extend(moving.iter().flat_map(|(_, bounds)| numbered(fixed.len() as u32, bounds)));
+    let strongest = all.into_iter().max_by(|a, b| a.1.total_cmp(&b.1));
+    let emitter = strongest.map_or(0, |(emitter, _)| emitter);
+    Err(LightOverflow { path: emitters.light_of(emitter).path.clone() })
 }
 
 fn summaries(

@@ -13,7 +13,6 @@ use crate::math::random::hash;
 use crate::scene::{Camera, Scene};
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
-use std::sync::atomic::{AtomicBool, Ordering};
 
 /// What does not change between the frames of a shot: geometry, textures, ray acceleration, the
 /// mapped tree.
@@ -35,25 +34,10 @@ pub struct RenderedFrame {
     pub stats: TraceStats,
 }
 
-/// Why a frame was not finished.
-#[derive(Debug, thiserror::Error, PartialEq, Eq)]
-pub enum FrameError {
-    /// The tree was built without this frame.
-    #[error(transparent)]
-    NoSuchFrame(#[from] NoSuchFrame),
-    /// Somebody asked to stop.
-    #[error("interrupted")]
-    Interrupted,
-}
-
 /// How a frame goes on, for whoever watches.
 pub trait Progress: Sync {
     /// Some of the frame's rows are done.
     fn rows_done(&self, rows: u64);
-    /// Whether to stop.
-    fn interrupted(&self) -> bool {
-        false
-    }
 }
 
 /// Nobody watches.
@@ -88,12 +72,12 @@ impl<'a, D: AsRef<[u8]> + Sync> RenderDelegate<'a, D> {
     /// Renders one frame. The picture depends on scene, settings and frame number alone.
     ///
     /// # Errors
-    /// If the tree lacks the frame, or `progress` asks to stop.
+    /// If the tree lacks the frame.
     pub fn render(
         &self,
         frame: i32,
         progress: &impl Progress,
-    ) -> Result<RenderedFrame, FrameError> {
+    ) -> Result<RenderedFrame, NoSuchFrame> {
         let pose = self.scene.pose_at(self.scene.timeline.seconds_at(f64::from(frame)));
         let infinite = infinite_lights(self.scene, &pose);
         let tree = self.tree.at_frame(frame, &self.static_leaves)?;
@@ -109,17 +93,12 @@ impl<'a, D: AsRef<[u8]> + Sync> RenderDelegate<'a, D> {
         };
         let frame_seed = hash(self.settings.seed, frame as u32);
         let mut buffers = RenderBuffers::new(width, height);
-        let stop = AtomicBool::new(false);
         let stats = buffers
             .pixels_mut()
             .par_chunks_mut(width as usize)
             .enumerate()
             .map(|(y, row)| {
                 let mut stats = TraceStats::default();
-                if progress.interrupted() {
-                    stop.store(true, Ordering::Relaxed);
-                    return stats;
-                }
                 for (x, pixel) in row.iter_mut().enumerate() {
                     let seed = hash(frame_seed, y as u32 * width + x as u32);
                     let mut mean = PixelMean::default();
@@ -132,9 +111,6 @@ impl<'a, D: AsRef<[u8]> + Sync> RenderDelegate<'a, D> {
                 stats
             })
             .reduce(TraceStats::default, TraceStats::plus);
-        if stop.into_inner() {
-            return Err(FrameError::Interrupted);
-        }
         Ok(RenderedFrame { buffers, stats })
     }
 }

@@ -31,5 +31,5 @@ pub mod rays;
 pub mod settings;
 pub mod surface;
 
-pub use delegate::{FrameError, Progress, RenderDelegate, RenderedFrame};
+pub use delegate::{Progress, RenderDelegate, RenderedFrame};
 pub use settings::{LightStrategy, RenderSettings};

@@ -91,6 +91,13 @@ impl Pose {
         Pose { world: exact.iter().map(DAffine3::as_affine3a).collect() }
     }
 
+    /// The world-space radius of a sphere of some local radius at a node, metres: it grows with the
+    /// cube root of the volume. What samples a sphere and what hits it must agree to the last bit.
+    pub fn world_radius(&self, node: u32, radius: f32) -> f32 {
+        let volume = self.world(node).matrix3.as_dmat3().determinant().abs();
+        (f64::from(radius) * volume.cbrt()) as f32
+    }
+
     /// Local to world for a node.
     #[inline]
     pub fn world(&self, node: u32) -> Affine3A {

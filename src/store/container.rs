@@ -216,6 +216,11 @@ impl<D: AsRef<[u8]>> Container<D> {
         bytemuck::try_cast_slice(&self.data.as_ref()[range.clone()]).unwrap_or(&[])
     }
 
+    /// What it was opened over.
+    pub fn into_bytes(self) -> D {
+        self.data
+    }
+
     /// All bytes.
     pub fn bytes(&self) -> &[u8] {
         self.data.as_ref()

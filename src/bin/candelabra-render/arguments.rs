@@ -18,10 +18,10 @@ pub struct Arguments {
     #[arg(long)]
     pub tree: Option<PathBuf>,
     /// Frames: 1001-1048, 1001-1048x2, 1,5,9; the first of the scene if not given
-    #[arg(short, long)]
+    #[arg(short, long, allow_hyphen_values = true)]
     pub frames: Option<Frames>,
     /// The pictures: street.####.exr or street.%04d.exr
-    #[arg(short, long, value_parser = FrameNames::new)]
+    #[arg(short, long, value_parser = pictures)]
     pub output: FrameNames,
     /// Samples of each pixel
     #[arg(long, default_value_t = 64, value_parser = clap::value_parser!(u32).range(1..))]
@@ -39,8 +39,8 @@ pub struct Arguments {
     #[arg(long, default_value_t = 0)]
     pub seed: u32,
     /// Threads; as many as there are cores if not given
-    #[arg(long)]
-    pub threads: Option<usize>,
+    #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024))]
+    pub threads: Option<u16>,
     /// How lights are picked
     #[arg(long, value_enum, default_value_t = Strategy::Tree)]
     pub light_sampler: Strategy,
@@ -74,13 +74,26 @@ pub enum Strategy {
     Exhaustive,
 }
 
-/// The largest width and height: the picture must fit into memory and into an EXR.
+/// The largest width and height.
 const LARGEST: u32 = 1 << 16;
+/// The most pixels: a pixel takes 64 bytes while a frame is rendered.
+const MOST_PIXELS: u64 = 1 << 27;
+
+/// Pictures are OpenEXR files, and their previews are named after them.
+fn pictures(pattern: &str) -> Result<FrameNames, String> {
+    if !pattern.to_ascii_lowercase().ends_with(".exr") {
+        return Err(format!("pictures are OpenEXR files: end the name in .exr, as {pattern}.exr"));
+    }
+    FrameNames::new(pattern).map_err(|error| error.to_string())
+}
 
 fn resolution(text: &str) -> Result<(u32, u32), String> {
     let sides = text.split_once(['x', 'X']);
     let parsed = sides.and_then(|(w, h)| Some((w.parse().ok()?, h.parse().ok()?)));
     match parsed {
+        Some((w, h)) if u64::from(w) * u64::from(h) > MOST_PIXELS => {
+            Err(format!("{w}x{h} is more than {MOST_PIXELS} pixels"))
+        }
         Some((w, h)) if (1..=LARGEST).contains(&w) && (1..=LARGEST).contains(&h) => Ok((w, h)),
         _ => Err(format!("write WIDTHxHEIGHT, such as 1280x720, each from 1 to {LARGEST}")),
     }

@@ -22,16 +22,22 @@ fn main() -> ExitCode {
     match shot::render(&arguments) {
         Ok(0) => ExitCode::SUCCESS,
         Ok(failed) => {
-            eprintln!("candelabra-render: {failed} frames failed; the others are done");
+            let plural = if failed == 1 { "" } else { "s" };
+            eprintln!("candelabra-render: {failed} frame{plural} failed; any others are done");
             ExitCode::from(FAILED)
         }
         Err(error) => {
             eprintln!("candelabra-render: {error:#}");
             ExitCode::from(match error {
-                error if error.is::<TreeError>() => BAD_TREE,
+                error if is_bad_tree(&error) => BAD_TREE,
                 error if error.is::<FrameNamesError>() => USAGE,
                 _ => FAILED,
             })
         }
     }
+}
+
+/// Whether the tree file itself is at fault; not one that is absent.
+fn is_bad_tree(error: &anyhow::Error) -> bool {
+    matches!(error.downcast_ref(), Some(TreeError::Broken { .. } | TreeError::Stale { .. }))
 }

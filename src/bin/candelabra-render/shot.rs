@@ -9,7 +9,7 @@ use candelabra::pipeline::{self, BuildOptions};
 use candelabra::render::exr::{ExrOptions, read_metadata, write_exr};
 use candelabra::render::frames::Frames;
 use candelabra::render::png::{exposure_for, write_png};
-use candelabra::render::{FrameError, RenderDelegate, RenderSettings};
+use candelabra::render::{RenderDelegate, RenderSettings};
 use candelabra::scene::{Camera, Scene};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -19,17 +19,21 @@ use std::time::Instant;
 /// Renders what the arguments ask for and returns how many frames failed.
 pub fn render(arguments: &Arguments) -> Result<usize> {
     if let Some(threads) = arguments.threads {
-        rayon::ThreadPoolBuilder::new().num_threads(threads).build_global()?;
+        rayon::ThreadPoolBuilder::new().num_threads(threads.into()).build_global()?;
     }
     let scene = pipeline::load_scene(&arguments.scene)?;
     for note in &scene.notes {
         eprintln!("note: {note}");
+    }
+    if scene.lights.iter().any(|l| l.forced) || scene.instances.iter().any(|i| i.forced) {
+        eprintln!("note: lights that ask to be sampled at every point are sampled like all others");
     }
     let frames = match &arguments.frames {
         Some(frames) => frames.clone(),
         None => Frames::from_str(&pipeline::frames_of(&scene)[0].to_string())?,
     };
     arguments.output.check(&frames)?;
+    refuse_to_overwrite(arguments, &scene, &frames)?;
     let camera = find_camera(&scene, arguments.camera.as_deref())?;
     let emitters = Emitters::collect(&scene);
     match &arguments.tree {
@@ -47,6 +51,30 @@ pub fn render(arguments: &Arguments) -> Result<usize> {
             render_frames(arguments, &scene, &emitters, &tree, camera, &frames)
         }
     }
+}
+
+/// No picture may replace what it is rendered from.
+fn refuse_to_overwrite(arguments: &Arguments, scene: &Scene, frames: &Frames) -> Result<()> {
+    for &frame in frames.as_slice() {
+        let picture = arguments.output.path(frame);
+        for output in [picture.with_extension("png"), picture] {
+            let is_tree = || arguments.tree.as_ref().is_some_and(|tree| same_file(tree, &output));
+            if scene.files.iter().any(|input| same_file(input, &output)) || is_tree() {
+                bail!("{}: is an input of this render; choose another name", output.display());
+            }
+        }
+    }
+    Ok(())
+}
+
+fn same_file(a: &Path, b: &Path) -> bool {
+    matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b)
+}
+
+/// This very program, by its content: another build may make other pictures.
+fn program_fingerprint() -> [u8; 32] {
+    let bytes = std::env::current_exe().and_then(std::fs::read).unwrap_or_default();
+    *blake3::hash(&bytes).as_bytes()
 }
 
 fn find_camera(scene: &Scene, wanted: Option<&str>) -> Result<Camera> {
@@ -85,7 +113,7 @@ impl Stamp {
     /// Over everything that the pixels depend on. The tree is not named: a fresh one follows from
     /// the scene and the algorithm, and its own fingerprint is of all frames that it was built for.
     fn new(
-        scene_fingerprint: &[u8; 32],
+        content: &[[u8; 32]; 2],
         camera: &Camera,
         arguments: &Arguments,
         settings: &RenderSettings,
@@ -93,9 +121,10 @@ impl Stamp {
     ) -> Result<Stamp> {
         let settings = serde_json::to_value(settings)?;
         let mut hasher = blake3::Hasher::new();
-        hasher.update(scene_fingerprint);
-        let float = arguments.float;
-        let rest = format!("{SOFTWARE} {ALGORITHM_VERSION} {camera:?} {float} {settings} {frame}");
+        hasher.update(content.as_flattened());
+        let (float, sound) = (arguments.float, !arguments.no_verify);
+        let rest =
+            format!("{SOFTWARE} {ALGORITHM_VERSION} {camera:?} {float} {sound} {settings} {frame}");
         hasher.update(rest.as_bytes());
         let fingerprint = hasher.finalize().to_hex().to_string();
         Ok(Stamp { software: SOFTWARE.into(), frame, fingerprint, settings })
@@ -118,8 +147,8 @@ fn render_frames<D: AsRef<[u8]> + Sync>(
     frames: &Frames,
 ) -> Result<usize> {
     let settings = arguments.settings(camera.aspect);
-    let scene_fingerprint = pipeline::scene_fingerprint(scene)?;
-    let stamp_of = |frame| Stamp::new(&scene_fingerprint, &camera, arguments, &settings, frame);
+    let content = [pipeline::scene_fingerprint(scene)?, program_fingerprint()];
+    let stamp_of = |frame| Stamp::new(&content, &camera, arguments, &settings, frame);
     let height = settings.height;
     let bar = Bar::new(frames.as_slice().len(), height);
     // Prepared when the first frame needs it: a finished shot resumes at once.
@@ -142,6 +171,7 @@ fn render_frames<D: AsRef<[u8]> + Sync>(
             Ok(line) => bar.line(&line),
             Err(error) => {
                 failed += 1;
+                bar.skip(height);
                 bar.line(&format!("frame {frame}: failed: {error:#}"));
             }
         }
@@ -159,11 +189,7 @@ fn render_frame<D: AsRef<[u8]> + Sync>(
     exposure: &mut Option<f32>,
 ) -> Result<String> {
     let started = Instant::now();
-    let rendered = match delegate.render(stamp.frame, bar) {
-        Ok(rendered) => rendered,
-        Err(error @ FrameError::NoSuchFrame(_)) => return Err(error.into()),
-        Err(FrameError::Interrupted) => bail!("interrupted"),
-    };
+    let rendered = delegate.render(stamp.frame, bar)?;
     let seconds = started.elapsed().as_secs_f64();
     let options = ExrOptions {
         float_beauty: arguments.float,

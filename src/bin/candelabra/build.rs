@@ -1,7 +1,8 @@
 //! `candelabra build`: a scene in, a tree file out.
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, bail};
 use candelabra::emitter::Emitters;
+use candelabra::light_tree::LightTree;
 use candelabra::pipeline::{self, BuildOptions, Survey};
 use candelabra::render::frames::Frames;
 use candelabra::store::write_atomically;
@@ -19,11 +20,11 @@ pub struct Arguments {
     output: Option<PathBuf>,
     /// Frames to build for, if lights move: 1001-1048, 1001-1048x2, 1,5,9; the scene's own if not
     /// given
-    #[arg(long)]
+    #[arg(long, allow_hyphen_values = true)]
     frames: Option<Frames>,
     /// Threads; as many as there are cores if not given
-    #[arg(long)]
-    threads: Option<usize>,
+    #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024))]
+    threads: Option<u16>,
     /// Build even if the output is up to date
     #[arg(long)]
     force: bool,
@@ -31,7 +32,7 @@ pub struct Arguments {
 
 pub fn run(arguments: &Arguments) -> Result<()> {
     if let Some(threads) = arguments.threads {
-        rayon::ThreadPoolBuilder::new().num_threads(threads).build_global()?;
+        rayon::ThreadPoolBuilder::new().num_threads(threads.into()).build_global()?;
     }
     let output = arguments.output.clone().unwrap_or(arguments.scene.with_extension("ltree"));
     let mut out = std::io::stdout().lock();
@@ -42,6 +43,10 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         eprintln!("note: {note}");
     }
     let loaded = started.elapsed();
+    let real = |path: &Path| path.canonicalize().ok();
+    if scene.files.iter().any(|input| real(input).is_some() && real(input) == real(&output)) {
+        bail!("{}: is the scene's own file; choose another output", output.display());
+    }
     let emitters = Emitters::collect(&scene);
     let frames = match &arguments.frames {
         Some(frames) => {
@@ -72,6 +77,9 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         BuildOptions { program: concat!("candelabra ", env!("CARGO_PKG_VERSION")).into() };
     let bytes = pipeline::build_tree(&survey, &options);
     let built = started.elapsed();
+    // What is about to replace a good file must be one.
+    let tree = LightTree::open(bytes).and_then(|tree| tree.verify().map(|()| tree));
+    let bytes = tree.with_context(|| format!("{}: not written", output.display()))?.into_bytes();
     write_atomically(&output, |file| file.write_all(bytes.as_ref()))?;
 
     let started = Instant::now();

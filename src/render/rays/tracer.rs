@@ -284,12 +284,12 @@ fn into_local(ray: &Ray, to_local: &DAffine3) -> Ray {
     }
 }
 
-/// The sphere lights that have a surface. The radius grows with the cube root of the volume.
+/// The sphere lights that have a surface.
 fn spheres(scene: &Scene, pose: &Pose) -> impl Iterator<Item = Sphere> {
     scene.lights.iter().enumerate().filter_map(|(number, light)| {
         let LightKind::Sphere { radius, .. } = light.kind else { return None };
         let world = world_of(pose, light.node);
-        let radius_m = f64::from(radius) * world.matrix3.determinant().abs().cbrt();
+        let radius_m = f64::from(pose.world_radius(light.node, radius));
         let center = world.translation;
         (radius_m > 0.0).then_some(Sphere { light: number as u32, center, radius_m })
     })
