@@ -107,3 +107,13 @@ fn a_closed_pipe_is_fine() {
     let complaint = String::from_utf8(output.stderr).unwrap();
     assert!(output.status.success() && complaint.is_empty(), "{}: {complaint}", output.status);
 }
+
+/// Whatever a user mistypes, the scene survives it.
+#[test]
+fn inputs_are_never_overwritten() {
+    let shot = Shot::still();
+    let scene = shot.read(SCENE);
+    shot.candelabra(&format!("build {SCENE} -o {SCENE}")).ends(1).complains(&["own file"]);
+    shot.render(&format!("-o {SCENE}")).ends(2).complains(&[".exr"]);
+    assert_eq!(shot.read(SCENE), scene);
+}

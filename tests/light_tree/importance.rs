@@ -103,3 +103,43 @@ fn a_point_obeys_the_inverse_square_and_the_cosine() {
     let inside = Receiver { point: Vec3::new(0.0, 0.0, 2.0), normal: Vec3::Z };
     assert!(node.importance(&inside).is_finite() && node.importance(&inside) > 1e6);
 }
+
+/// Receivers placed along the edge of what a cluster can light, where rounding decides: for each the
+/// exact cosine beyond the cone is known, and light that is there is not called absent.
+#[test]
+fn light_at_the_very_edge_is_not_called_dark() {
+    use candelabra::bounds::{Aabb, Cone};
+    use glam::DVec3;
+    let mut worst = 0f64;
+    for step in 0..200_000u32 {
+        let random =
+            |n: u32| f64::from(candelabra::math::random::hash(step, n)) / f64::from(u32::MAX);
+        let half = Vec3::splat(10f64.powf(-3.0 * random(0)) as f32);
+        let theta_o = if step % 3 == 0 { 0.0 } else { 3.0 * random(1) };
+        let cone = Cone { theta_o: theta_o as f32, ..Cone::flat(Vec3::Y, false) };
+        let aabb = Aabb { min: -half, max: half };
+        let node = Node::encode(&LightBounds { aabb, cone, energy: 1.0 }, Link::Emitter(0));
+        // What sampling sees, exactly.
+        let bounds = node.bounds();
+        let radius = node.half_extent().as_dvec3().length();
+        let distance = radius * (1.0 + 10f64.powf(-6.0 + 8.0 * random(2)));
+        let theta_u = (radius / distance).asin();
+        let edge = f64::from(bounds.cone.theta_o) + theta_u + std::f64::consts::FRAC_PI_2;
+        if edge >= std::f64::consts::PI {
+            continue;
+        }
+        let inside = edge - 10f64.powf(-7.0 + 4.0 * random(3));
+        let axis = bounds.cone.axis.as_dvec3().normalize();
+        let across = axis.any_orthonormal_vector();
+        let turn = glam::DQuat::from_axis_angle(axis, random(4) * 6.28);
+        let direction: DVec3 = axis * inside.cos() + turn * across * inside.sin();
+        let center = node.center().as_dvec3();
+        let receiver =
+            Receiver { point: (center + direction * distance).as_vec3(), normal: Vec3::ZERO };
+        if node.importance(&receiver) == 0.0 {
+            worst = worst.max(edge - inside);
+        }
+    }
+    // The receiver itself was rounded to f32.
+    assert!(worst < 1e-6, "{worst}");
+}

@@ -62,3 +62,21 @@ fn a_near_lamp_far_from_the_origin_does_not_hide_itself() {
     stage.light(ball(0.125), at(center));
     assert_lit(stage, 5.0 * of_sphere(center, 0.125, DVec3::Y));
 }
+
+/// Ingest takes a scale that is uniform to one part in ten thousand for uniform: the sphere that is
+/// sampled must then still be the one that rays hit.
+#[test]
+fn a_sphere_under_a_hardly_uniform_scale_does_not_hide_itself() {
+    for axis in [DVec3::X, DVec3::Y, DVec3::Z] {
+        for off in [-9e-5, 9e-5] {
+            let center = DVec3::Y * 2.0;
+            let Trs::Parts { translation, rotation, .. } = at(center) else { unreachable!() };
+            let place = Trs::Parts { translation, rotation, scale: DVec3::ONE + axis * off };
+            let mut stage = receiver(DVec3::Y);
+            stage.light(ball(0.5), place);
+            let seen = Estimate::of_picture(&stage.render(&direct(8, 256))).mean.x;
+            let expected = 5.0 * of_sphere(center, 0.5, DVec3::Y) * ALBEDO / PI;
+            assert!((seen / expected - 1.0).abs() < 0.01, "{axis} {off}: {seen} {expected}");
+        }
+    }
+}
