@@ -131,7 +131,7 @@ fn light_at_the_very_edge_is_not_called_dark() {
         let inside = edge - 10f64.powf(-7.0 + 4.0 * random(3));
         let axis = bounds.cone.axis.as_dvec3().normalize();
         let across = axis.any_orthonormal_vector();
-        let turn = glam::DQuat::from_axis_angle(axis, random(4) * 6.28);
+        let turn = glam::DQuat::from_axis_angle(axis, random(4) * std::f64::consts::TAU);
         let direction: DVec3 = axis * inside.cos() + turn * across * inside.sin();
         let center = node.center().as_dvec3();
         let receiver =
