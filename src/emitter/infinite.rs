@@ -39,32 +39,36 @@ pub struct InfiniteSample {
     pub pdf: Option<f32>,
 }
 
-/// The lights of a scene that are at infinity and shine.
+/// The lights of a scene that are at infinity and shine in a pose.
 pub fn infinite_lights<'a>(scene: &'a Scene, pose: &Pose) -> Vec<InfiniteLight<'a>> {
     let rotation = |node: u32| {
         // The rotation that remains of a transform without its scale.
         let (_, rotation, _) = pose.world(node).to_scale_rotation_translation();
         if rotation.is_finite() { rotation.normalize() } else { Quat::IDENTITY }
     };
-    let kind = |light: &crate::scene::Light| match &light.kind {
-        &LightKind::Distant { irradiance_lux, angle_rad } if irradiance_lux.max_element() > 0.0 => {
+    let kind = |light: &crate::scene::Light, rgb: Rgb| match light.kind {
+        LightKind::Distant { angle_rad, .. } if rgb.max_element() > 0.0 => {
             let half_angle_rad = 0.5 * angle_rad.clamp(0.0, 2.0 * PI);
             let sine = (0.5 * half_angle_rad).sin();
             Some(Kind::Sun(Sun {
                 towards: rotation(light.node) * Vec3::Z,
-                irradiance_lux,
+                irradiance_lux: rgb,
                 half_angle_rad,
                 one_minus_cos: 2.0 * sine * sine,
             }))
         }
-        LightKind::Dome { radiance_nits, texture } if radiance_nits.max_element() > 0.0 => {
+        LightKind::Dome { texture, .. } if rgb.max_element() > 0.0 => {
             let texture = texture.map(|index| &scene.textures[index as usize]);
-            Some(Kind::Dome(Box::new(Dome::new(rotation(light.node), *radiance_nits, texture))))
+            Some(Kind::Dome(Box::new(Dome::new(rotation(light.node), rgb, texture))))
         }
         _ => None,
     };
     let lights = scene.lights.iter().enumerate();
-    lights.filter_map(|(light, row)| Some(InfiniteLight { light, kind: kind(row)? })).collect()
+    let found = lights.filter_map(|(light, row)| {
+        let rgb = scene.rgb_of_light(light as u32, pose);
+        Some(InfiniteLight { light, kind: kind(row, rgb)? })
+    });
+    found.collect()
 }
 
 impl InfiniteLight<'_> {

@@ -73,7 +73,7 @@ pub struct EmitterHit {
 }
 
 impl<'a> PosedEmitters<'a> {
-    /// The bounds of all emitters that stand still, or of all that move, in their order.
+    /// The bounds of all emitters that neither move nor vary, or of all others, in their order.
     ///
     /// # Errors
     /// The path of a light whose place or energy is beyond `f32`.
@@ -100,7 +100,8 @@ impl<'a> PosedEmitters<'a> {
         let instance = &self.scene.instances[row as usize];
         let material = self.material(instance);
         let triangle = self.triangle(instance, self.emitters.get(emitter).triangle);
-        let radiance = material.emission_nits * self.emitters.texture_mean(emitter);
+        let nits = self.scene.rgb_of_instance(row, self.pose);
+        let radiance = nits * self.emitters.texture_mean(emitter);
         let facing = Cone::flat(
             triangle.area_normal().normalize_or(Vec3::Z) * self.handedness(instance),
             material.double_sided,
@@ -120,25 +121,22 @@ impl<'a> PosedEmitters<'a> {
 
     fn bounds_of_light(&self, row: u32) -> LightBounds {
         let light = &self.scene.lights[row as usize];
+        let strength = luminance(self.scene.rgb_of_light(row, self.pose));
         let here = Vec3::from(self.pose.world(light.node).translation);
         let aimed = |shaping: &Shaping| Cone::spot(self.aim(light.node), shaping.half_angle_rad());
         match &light.kind {
-            LightKind::Point { intensity_cd } => LightBounds {
-                aabb: Aabb::around([here]),
-                cone: Cone::ALL,
-                energy: luminance(*intensity_cd),
-            },
-            LightKind::Spot { intensity_cd, shaping } => LightBounds {
-                aabb: Aabb::around([here]),
-                cone: aimed(shaping),
-                energy: luminance(*intensity_cd),
-            },
-            LightKind::Sphere { radiance_nits, shaping, .. } => {
+            LightKind::Point { .. } => {
+                LightBounds { aabb: Aabb::around([here]), cone: Cone::ALL, energy: strength }
+            }
+            LightKind::Spot { shaping, .. } => {
+                LightBounds { aabb: Aabb::around([here]), cone: aimed(shaping), energy: strength }
+            }
+            LightKind::Sphere { shaping, .. } => {
                 let sphere = self.sphere(light);
                 LightBounds {
                     aabb: Aabb { min: here - sphere.radius, max: here + sphere.radius },
                     cone: shaping.as_ref().map_or(Cone::ALL, aimed),
-                    energy: luminance(*radiance_nits) * PI * sphere.radius * sphere.radius,
+                    energy: strength * PI * sphere.radius * sphere.radius,
                 }
             }
             LightKind::Distant { .. } | LightKind::Dome { .. } => {
@@ -159,7 +157,7 @@ impl<'a> PosedEmitters<'a> {
                 let point = triangle.at(barycentric);
                 let direction = (point - receiver).try_normalize()?;
                 let radiance =
-                    self.triangle_radiance(emitter, instance, &triangle, barycentric, direction);
+                    self.triangle_radiance(emitter, row, &triangle, barycentric, direction);
                 (radiance != Rgb::ZERO).then_some(LightSample {
                     direction,
                     point,
@@ -170,24 +168,22 @@ impl<'a> PosedEmitters<'a> {
                     on_mesh: Some(MeshPlace { instance: row, triangle: number, barycentric }),
                 })
             }
-            LightSource::Light(row) => {
-                self.sample_light(&self.scene.lights[row as usize], receiver, u)
-            }
+            LightSource::Light(row) => self.sample_light(row, receiver, u),
         }
     }
 
-    fn sample_light(&self, light: &Light, receiver: Vec3, u: Vec2) -> Option<LightSample> {
+    fn sample_light(&self, row: u32, receiver: Vec3, u: Vec2) -> Option<LightSample> {
+        let light = &self.scene.lights[row as usize];
+        let rgb = self.scene.rgb_of_light(row, self.pose);
         let shaped = |shaping: &Option<Shaping>, direction: Vec3| {
             shaping.map_or(Rgb::ONE, |s| s.factor((-direction).dot(self.aim(light.node))))
         };
         let sample = match &light.kind {
-            LightKind::Point { intensity_cd } => {
-                self.sample_point(light, receiver, *intensity_cd, &None)?
+            LightKind::Point { .. } => self.sample_point(light, receiver, rgb, &None)?,
+            LightKind::Spot { shaping, .. } => {
+                self.sample_point(light, receiver, rgb, &Some(*shaping))?
             }
-            LightKind::Spot { intensity_cd, shaping } => {
-                self.sample_point(light, receiver, *intensity_cd, &Some(*shaping))?
-            }
-            LightKind::Sphere { radiance_nits, shaping, .. } => {
+            LightKind::Sphere { shaping, .. } => {
                 let sphere = self.sphere(light);
                 let found = sphere.sample(receiver, u)?;
                 let point = receiver + found.direction * found.distance;
@@ -196,7 +192,7 @@ impl<'a> PosedEmitters<'a> {
                     point,
                     normal: (point - sphere.center).normalize_or_zero(),
                     magnitude_m: receiver.abs().max(point.abs()).max_element(),
-                    radiance: *radiance_nits * shaped(shaping, found.direction),
+                    radiance: rgb * shaped(shaping, found.direction),
                     pdf: Some(found.pdf),
                     on_mesh: None,
                 }
@@ -243,12 +239,13 @@ impl<'a> PosedEmitters<'a> {
             LightSource::Instance(row) => {
                 let instance = &self.scene.instances[row as usize];
                 let triangle = self.triangle(instance, self.emitters.get(hit.emitter).triangle);
-                self.triangle_radiance(hit.emitter, instance, &triangle, hit.barycentric, direction)
+                self.triangle_radiance(hit.emitter, row, &triangle, hit.barycentric, direction)
             }
             LightSource::Light(row) => match &self.scene.lights[row as usize] {
-                Light { node, kind: LightKind::Sphere { radiance_nits, shaping, .. }, .. } => {
+                Light { node, kind: LightKind::Sphere { shaping, .. }, .. } => {
                     let cosine = (-direction).dot(self.aim(*node));
-                    *radiance_nits * shaping.map_or(Rgb::ONE, |s| s.factor(cosine))
+                    self.scene.rgb_of_light(row, self.pose)
+                        * shaping.map_or(Rgb::ONE, |s| s.factor(cosine))
                 }
                 _ => Rgb::ZERO,
             },
@@ -276,17 +273,18 @@ impl<'a> PosedEmitters<'a> {
     fn triangle_radiance(
         &self,
         emitter: u32,
-        instance: &Instance,
+        row: u32,
         triangle: &WorldTriangle,
         barycentric: Vec2,
         direction: Vec3,
     ) -> Rgb {
+        let instance = &self.scene.instances[row as usize];
         let material = self.material(instance);
         let facing = -direction.dot(triangle.area_normal()) * self.handedness(instance);
         if facing == 0.0 || (facing < 0.0 && !material.double_sided) {
             return Rgb::ZERO;
         }
-        let mut radiance = material.emission_nits;
+        let mut radiance = self.scene.rgb_of_instance(row, self.pose);
         if let Some(usage) = material.emission_texture {
             let mesh = &self.scene.meshes[instance.mesh as usize];
             if let Some(uvs) = mesh.uv_sets.get(usage.uv_set as usize).filter(|set| !set.is_empty())

@@ -31,8 +31,10 @@ pub struct LightEntry {
     pub path: String,
     /// Where it comes from.
     pub source: LightSource,
-    /// Whether its node moves with time.
+    /// Whether its bounds change with time: its node moves, or its strength varies.
     pub moves: bool,
+    /// Whether its strength varies with time.
+    pub varies: bool,
     /// Number of its first emitter.
     pub first: u32,
     /// How many emitters it has.
@@ -46,8 +48,8 @@ pub struct LightEntry {
 /// All emitters of a scene that the tree is built over. Suns and domes are not among them; see
 /// [`infinite_lights`](super::infinite_lights).
 ///
-/// Emitters are numbered light by light: first the lights that stand still, then those that move,
-/// each in order of path; within a light in order of triangle. The numbers depend on the scene
+/// Emitters are numbered light by light: first the lights that stand still, then those that move
+/// or vary, each in order of path; within a light in order of triangle. The numbers depend on the scene
 /// alone, not on the order of its tables.
 pub struct Emitters {
     lights: Vec<LightEntry>,
@@ -60,20 +62,26 @@ pub struct Emitters {
 }
 
 impl Emitters {
-    /// Finds all emitters of a scene. Triangles without area and triangles whose texels are all
-    /// black are none.
+    /// Finds all emitters of a scene, by the most that each light ever gives. Triangles without
+    /// area and triangles whose texels are all black are none.
     pub fn collect(scene: &Scene) -> Emitters {
         let moving = scene.moving_nodes();
         let whole_means: Vec<OnceLock<Rgb>> =
             scene.textures.iter().map(|_| OnceLock::new()).collect();
         let mesh_light = |(i, instance): (usize, &crate::scene::Instance)| {
             let mesh = &scene.meshes[instance.mesh as usize];
-            let material = scene.material_of(instance.mesh).filter(|material| material.emits())?;
-            let found = emitting_triangles(scene, mesh, material, &whole_means);
+            let material = scene.material_of(instance.mesh)?;
+            let peak = scene.peak_rgb_of_instance(i as u32);
+            if peak.max_element() <= 0.0 {
+                return None;
+            }
+            let found = emitting_triangles(scene, mesh, material, peak, &whole_means);
+            let varies = instance.values.is_some();
             (found.count > 0).then(|| LightEntry {
                 path: instance.path.clone(),
                 source: LightSource::Instance(i as u32),
-                moves: moving[instance.node as usize],
+                moves: moving[instance.node as usize] || varies,
+                varies,
                 first: 0,
                 count: found.count,
                 triangles: found.triangles,
@@ -82,11 +90,16 @@ impl Emitters {
         };
         let mut lights: Vec<LightEntry> =
             scene.instances.par_iter().enumerate().filter_map(mesh_light).collect();
-        let other = scene.lights.iter().enumerate().filter(|(_, light)| shines(&light.kind));
+        let other = scene
+            .lights
+            .iter()
+            .enumerate()
+            .filter(|(i, light)| shines(&light.kind, scene.peak_rgb_of_light(*i as u32)));
         lights.extend(other.map(|(i, light)| LightEntry {
             path: scene.light_path(i).to_owned(),
             source: LightSource::Light(i as u32),
-            moves: moving[light.node as usize],
+            moves: moving[light.node as usize] || light.values.is_some(),
+            varies: light.values.is_some(),
             first: 0,
             count: 1,
             triangles: None,
@@ -137,7 +150,7 @@ impl Emitters {
         self.refs.is_empty()
     }
 
-    /// How many emitters stand still: they come first.
+    /// How many emitters neither move nor vary: they come first.
     pub fn static_count(&self) -> usize {
         self.static_count
     }
@@ -180,14 +193,10 @@ impl Emitters {
 }
 
 /// Whether a light that is not a mesh is an emitter.
-fn shines(kind: &LightKind) -> bool {
+fn shines(kind: &LightKind, peak: Rgb) -> bool {
     match kind {
-        LightKind::Point { intensity_cd } | LightKind::Spot { intensity_cd, .. } => {
-            luminance(*intensity_cd) > 0.0
-        }
-        LightKind::Sphere { radiance_nits, radius, .. } => {
-            luminance(*radiance_nits) > 0.0 && *radius > 0.0
-        }
+        LightKind::Point { .. } | LightKind::Spot { .. } => luminance(peak) > 0.0,
+        LightKind::Sphere { radius, .. } => luminance(peak) > 0.0 && *radius > 0.0,
         LightKind::Distant { .. } | LightKind::Dome { .. } => false,
     }
 }
@@ -203,6 +212,7 @@ fn emitting_triangles(
     scene: &Scene,
     mesh: &Mesh,
     material: &Material,
+    peak_nits: Rgb,
     whole_means: &[OnceLock<Rgb>],
 ) -> Emitting {
     let textured = material
@@ -224,7 +234,7 @@ fn emitting_triangles(
         let [a, b, c] = corners.map(|corner| mesh.positions[corner as usize].as_dvec3());
         let has_area = (b - a).cross(c - a).length_squared() > 0.0;
         let mean = if has_area { mean_of(corners) } else { Rgb::ZERO };
-        (luminance(mean * material.emission_nits) > 0.0).then_some((triangle as u32, mean))
+        (luminance(mean * peak_nits) > 0.0).then_some((triangle as u32, mean))
     };
     let found: Vec<(u32, Rgb)> =
         mesh.triangles.par_iter().enumerate().filter_map(emission).collect();

@@ -1,6 +1,6 @@
 //! Which frames a shot has, where nobody says.
 
-use crate::scene::{Channel, Scene};
+use crate::scene::{Channel, Keys, Scene};
 
 /// The frames of a scene's own timeline: from its first to its last, or to the last animation key
 /// if the file names no last frame. A scene that stands still has one.
@@ -12,7 +12,10 @@ pub fn frames_of(scene: &Scene) -> Vec<i32> {
             Channel::Translation(keys) | Channel::Scale(keys) => keys.times_s.last(),
             Channel::Rotation(keys) => keys.times_s.last(),
         });
-        let last_s = seconds.flatten().fold(0f32, |last, &key| last.max(key));
+        let of_lights = scene.lights.iter().filter_map(|light| light.values.as_ref());
+        let of_meshes = scene.instances.iter().filter_map(|instance| instance.values.as_ref());
+        let values = of_lights.chain(of_meshes).map(|keys: &Keys<_>| keys.times_s.last());
+        let last_s = seconds.chain(values).flatten().fold(0f32, |last, &key| last.max(key));
         timeline.first_frame + f64::from(last_s) * timeline.frames_per_second
     };
     let last = timeline.last_frame.unwrap_or_else(last_key);

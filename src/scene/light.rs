@@ -1,5 +1,6 @@
 //! Lights that are not meshes.
 
+use super::Keys;
 use crate::math::color::Rgb;
 
 /// A light at a node. Where it aims, it aims along the node's local -Z.
@@ -9,6 +10,9 @@ pub struct Light {
     pub node: u32,
     /// What it is and how strong.
     pub kind: LightKind,
+    /// Where it varies with time: what takes the place of the strength in `kind`, in the same unit
+    /// (candela, nits or lux). Never below zero; linear or stepped, not a spline.
+    pub values: Option<Keys<Rgb>>,
     /// Beyond this distance in metres it gives no light (glTF `range`); `None` is physical.
     pub range_m: Option<f32>,
     /// Take it out of the importance heuristic and sample it at every point.
@@ -57,6 +61,22 @@ pub enum LightKind {
         /// Index into [`Scene::textures`](super::Scene::textures).
         texture: Option<u32>,
     },
+}
+
+impl LightKind {
+    /// Its strength, in its own unit: candela of a point or a spot, nits of a sphere or a dome, lux
+    /// of a sun.
+    pub fn rgb(&self) -> Rgb {
+        match *self {
+            LightKind::Point { intensity_cd } | LightKind::Spot { intensity_cd, .. } => {
+                intensity_cd
+            }
+            LightKind::Sphere { radiance_nits, .. } | LightKind::Dome { radiance_nits, .. } => {
+                radiance_nits
+            }
+            LightKind::Distant { irradiance_lux, .. } => irradiance_lux,
+        }
+    }
 }
 
 /// An emission profile: a factor on radiance or intensity by the angle off the axis (-Z).

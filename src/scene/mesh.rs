@@ -1,6 +1,7 @@
 //! Triangles, and where they stand.
 
-use super::Shaping;
+use super::{Keys, Shaping};
+use crate::math::color::Rgb;
 use glam::{Vec2, Vec3, Vec4};
 
 /// Triangles with one material, in local space. All attribute arrays that are not empty have as
@@ -34,6 +35,10 @@ pub struct Instance {
     pub node: u32,
     /// Index into [`Scene::meshes`](super::Scene::meshes).
     pub mesh: u32,
+    /// Where the mesh's light varies with time: nits that take the place of the material's, which
+    /// the material's emission texture multiplies. Never below zero; linear or stepped, not a
+    /// spline.
+    pub values: Option<Keys<Rgb>>,
     /// Profile of the mesh's emission about the node's -Z, if it has one.
     pub shaping: Option<Shaping>,
     /// Take the mesh's light out of the importance heuristic and sample it at every point.

@@ -26,6 +26,7 @@ mod pose;
 mod requirements;
 mod texture;
 mod timeline;
+mod values;
 
 pub use camera::Camera;
 pub use light::{Light, LightKind, Shaping};
@@ -66,9 +67,9 @@ pub struct Scene {
 }
 
 impl Scene {
-    /// World transforms of all nodes at `time_s` seconds on the file's clock.
+    /// Where everything is and how strong it shines at `time_s` seconds on the file's clock.
     pub fn pose_at(&self, time_s: f64) -> Pose {
-        Pose::evaluate(&self.nodes, time_s)
+        Pose::evaluate(self, time_s)
     }
 
     /// For each node, whether it moves with time.

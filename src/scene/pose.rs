@@ -1,5 +1,7 @@
-//! The transform hierarchy and its evaluation at a time.
+//! The transform hierarchy, and the evaluation of whatever is animated at a time.
 
+use super::Scene;
+use crate::math::color::Rgb;
 use glam::{Affine3A, DAffine3, DQuat, DVec3, Quat, Vec3};
 
 /// A place in the transform hierarchy.
@@ -42,7 +44,7 @@ pub enum Channel {
     Scale(Keys<Vec3>),
 }
 
-/// Key times and values of a channel.
+/// Key times and values of a channel, or of a light.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Keys<T> {
     /// Seconds on the file's clock, ascending, not empty.
@@ -65,10 +67,14 @@ pub enum Interpolation {
     Cubic,
 }
 
-/// World transforms of all nodes at one time.
+/// What varies, at one time: world transforms of all nodes, strengths of the lights that have keys.
 #[derive(Clone, Debug)]
 pub struct Pose {
     world: Vec<Affine3A>,
+    /// By row of [`Scene::lights`]; empty if none varies.
+    light_rgb: Vec<Option<Rgb>>,
+    /// By row of [`Scene::instances`]; empty if none varies.
+    instance_rgb: Vec<Option<Rgb>>,
 }
 
 impl Default for Trs {
@@ -79,16 +85,22 @@ impl Default for Trs {
 
 impl Pose {
     /// Composes the hierarchy in double precision, so that only the result is rounded.
-    pub(super) fn evaluate(nodes: &[Node], time_s: f64) -> Pose {
-        let mut exact: Vec<DAffine3> = Vec::with_capacity(nodes.len());
-        for node in nodes {
+    pub(super) fn evaluate(scene: &Scene, time_s: f64) -> Pose {
+        let mut exact: Vec<DAffine3> = Vec::with_capacity(scene.nodes.len());
+        for node in &scene.nodes {
             let local = node.local_at(time_s);
             exact.push(match node.parent {
                 Some(parent) => exact[parent as usize] * local,
                 None => local,
             });
         }
-        Pose { world: exact.iter().map(DAffine3::as_affine3a).collect() }
+        let lights = scene.lights.iter().map(|light| light.values.as_ref());
+        let instances = scene.instances.iter().map(|instance| instance.values.as_ref());
+        Pose {
+            world: exact.iter().map(DAffine3::as_affine3a).collect(),
+            light_rgb: values_at(lights, time_s),
+            instance_rgb: values_at(instances, time_s),
+        }
     }
 
     /// The world-space radius of a sphere of some local radius at a node, metres: it grows with the
@@ -98,11 +110,34 @@ impl Pose {
         (f64::from(radius) * volume.cbrt()) as f32
     }
 
+    /// The strength of a light that varies, in its own unit: candela, nits or lux.
+    #[inline]
+    pub fn light_rgb(&self, light: u32) -> Option<Rgb> {
+        self.light_rgb.get(light as usize).copied().flatten()
+    }
+
+    /// The emission of a mesh light that varies, nits, before its texture.
+    #[inline]
+    pub fn instance_rgb(&self, instance: u32) -> Option<Rgb> {
+        self.instance_rgb.get(instance as usize).copied().flatten()
+    }
+
     /// Local to world for a node.
     #[inline]
     pub fn world(&self, node: u32) -> Affine3A {
         self.world[node as usize]
     }
+}
+
+/// The values of a table at a time; no table if it has no keys.
+fn values_at<'a>(
+    rows: impl Iterator<Item = Option<&'a Keys<Rgb>>> + Clone,
+    time_s: f64,
+) -> Vec<Option<Rgb>> {
+    if rows.clone().all(|keys| keys.is_none()) {
+        return Vec::new();
+    }
+    rows.map(|keys| Some(keys?.vector_at(time_s).as_vec3())).collect()
 }
 
 /// Which nodes move: those with channels, and all below them.
@@ -179,6 +214,11 @@ impl<T: Copy> Keys<T> {
 }
 
 impl Keys<Vec3> {
+    /// The largest of each component over all keys: what values that are no spline never exceed.
+    pub(super) fn peak(&self) -> Vec3 {
+        self.values.iter().fold(Vec3::ZERO, |peak, &value| peak.max(value))
+    }
+
     fn vector_at(&self, time_s: f64) -> DVec3 {
         let at = self.find(time_s);
         match self.interpolation {

@@ -12,6 +12,8 @@ pub struct Requirements {
     pub textured_mesh_lights: usize,
     /// Mesh lights and other lights with an emission profile.
     pub shaped_lights: usize,
+    /// Mesh lights and other lights whose strength varies with time.
+    pub varying_lights: usize,
     /// Sphere lights sampled as spheres.
     pub spheres: usize,
     /// Point lights.
@@ -40,19 +42,20 @@ impl Requirements {
     pub(super) fn of(scene: &Scene) -> Requirements {
         let mut needs = Requirements { textures: scene.textures.len(), ..Default::default() };
         let mut uses = vec![0u32; scene.meshes.len()];
-        for instance in &scene.instances {
+        for (number, instance) in (0..).zip(&scene.instances) {
             uses[instance.mesh as usize] += 1;
-            let material = scene.meshes[instance.mesh as usize].material;
-            if let Some(material) = material.map(|m| &scene.materials[m as usize])
-                && material.emits()
+            if let Some(material) = scene.material_of(instance.mesh)
+                && scene.peak_rgb_of_instance(number).max_element() > 0.0
             {
                 needs.mesh_lights += 1;
+                needs.varying_lights += usize::from(instance.values.is_some());
                 needs.textured_mesh_lights += usize::from(material.emission_texture.is_some());
                 needs.shaped_lights += usize::from(instance.shaping.is_some());
             }
         }
         needs.shared_meshes = uses.iter().filter(|&&count| count > 1).count();
         for light in &scene.lights {
+            needs.varying_lights += usize::from(light.values.is_some());
             match light.kind {
                 LightKind::Point { .. } => needs.points += 1,
                 LightKind::Spot { .. } => needs.spots += 1,

@@ -294,6 +294,28 @@ fn pictures_that_are_used_are_whole() {
 }
 
 #[test]
+fn light_values_are_light_over_time() {
+    let broken = |problem: &str, times: serde_json::Value, rgb: serde_json::Value| {
+        refuses("node 0 \"lamp\"", problem, |f| {
+            let values = json!({"times": times, "rgb": rgb});
+            f.lux(json!({"type": "RectLight", "values": values}));
+        });
+    };
+    broken("do not ascend", json!([1, 0]), json!([[1, 1, 1], [1, 1, 1]]));
+    broken("do not ascend", json!([1, 1.00000001]), json!([[1, 1, 1], [1, 1, 1]]));
+    broken("2 times and 1 rgb", json!([0, 1]), json!([[1, 1, 1]]));
+    broken("0 keys", json!([]), json!([]));
+    broken("negative", json!([0]), json!([[1, -0.5, 1]]));
+    broken("too large", json!([0]), json!([[1, 1e39, 1]]));
+    broken("too large", json!([1e300]), json!([[1, 1, 1]]));
+    broken("1048577 keys", json!(vec![0; (1 << 20) + 1]), json!([]));
+    broken("invalid length 2", json!([0]), json!([[1, 1]]));
+    refuses("usdLux", "missing field `rgb`", |f| {
+        f.lux(json!({"type": "RectLight", "values": {"times": [0]}}));
+    });
+}
+
+#[test]
 fn nothing_outside_the_folder_is_read() {
     for uri in ["../data.bin", "/etc/passwd", "file:///etc/passwd", "http://a/data.bin"] {
         refuses("buffer 0", "", |f| f.json["buffers"][0]["uri"] = json!(uri));

@@ -167,11 +167,77 @@ fn the_clock_is_the_stages() {
 #[test]
 fn what_is_not_carried_is_noted() {
     let scene = load(|file| {
-        let values = json!({"times": [0, 1], "rgb": [[1, 1, 1], [2, 2, 2]]});
-        file.lux(json!({"type": "RectLight", "values": values}));
         file.add("nodes", json!({"extras": {"usdLux": {"type": "PortalLight"}}}));
         file.json["scenes"][0]["nodes"] = json!([0, 1]);
     });
-    assert_eq!(scene.notes.len(), 2, "{:?}", scene.notes);
+    assert_eq!(scene.notes.len(), 1, "{:?}", scene.notes);
     assert!(scene.notes.iter().any(|note| note.contains("node 1") && note.contains("PortalLight")));
+}
+
+/// Values at 0 and 1 seconds.
+fn fading() -> serde_json::Value {
+    json!({"times": [0, 1], "rgb": [[0, 0, 0], [2, 4, 0]]})
+}
+
+#[test]
+fn a_mesh_light_varies() {
+    let scene = load(|file| file.lux(json!({"type": "RectLight", "values": fading()})));
+    let at = |time_s| scene.rgb_of_instance(0, &scene.pose_at(time_s));
+    assert_eq!((at(-1.0), at(0.25)), (Vec3::ZERO, Vec3::new(0.5, 1.0, 0.0)));
+    assert_eq!((at(1.0), at(9.0)), (Vec3::new(2.0, 4.0, 0.0), Vec3::new(2.0, 4.0, 0.0)));
+    assert_eq!(scene.peak_rgb_of_instance(0), Vec3::new(2.0, 4.0, 0.0));
+    assert_eq!(scene.requirements().varying_lights, 1);
+    let instanced = load(|file| {
+        file.lux(json!({"type": "RectLight", "values": fading()}));
+        let places = file.floats(&[0.0; 6], "VEC3");
+        file.json["nodes"][0]["extensions"] =
+            json!({"EXT_mesh_gpu_instancing": {"attributes": {"TRANSLATION": places}}});
+    });
+    assert_eq!(instanced.instances.len(), 2);
+    assert!(instanced.instances.iter().all(|instance| instance.values.is_some()));
+}
+
+#[test]
+fn a_light_that_is_dark_at_first_is_one() {
+    let scene = load(|file| {
+        file.json["materials"][0].as_object_mut().unwrap().remove("emissiveFactor");
+        file.lux(json!({"type": "RectLight", "values": fading()}));
+    });
+    assert_eq!(scene.requirements().mesh_lights, 1);
+    let emitters = candelabra::emitter::Emitters::collect(&scene);
+    assert_eq!((emitters.len(), emitters.static_count()), (1, 0));
+    assert!(emitters.lights()[0].varies);
+    let dark = load(|file| {
+        let values = json!({"times": [0, 1], "rgb": [[0, 0, 0], [0, 0, 0]]});
+        file.lux(json!({"type": "RectLight", "values": values}));
+    });
+    assert!(candelabra::emitter::Emitters::collect(&dark).is_empty());
+}
+
+#[test]
+fn every_kind_of_light_varies() {
+    let punctual = |light: serde_json::Value, kind: &str| {
+        let (light, kind) = (light.clone(), kind.to_owned());
+        load(move |file| {
+            file.light(light);
+            file.lux(json!({"type": kind, "values": fading()}));
+        })
+    };
+    let point = punctual(json!({"type": "point"}), "SphereLight");
+    let sun = punctual(json!({"type": "directional"}), "DistantLight");
+    let dome = load(|file| file.lux(json!({"type": "DomeLight", "values": fading()})));
+    let sphere = load(|file| {
+        file.lux(json!({"type": "SphereLight", "radius": 0.5, "values": fading()}));
+    });
+    for scene in [&point, &sun, &dome, &sphere] {
+        let pose = scene.pose_at(0.5);
+        assert_eq!(pose.light_rgb(0), Some(Vec3::new(1.0, 2.0, 0.0)), "{:?}", scene.lights);
+        assert_eq!(scene.notes, [] as [&str; 0]);
+    }
+    // One node has one light: the values are not those of a mesh beside it.
+    assert_eq!(point.instances.len(), 1);
+    assert_eq!(point.pose_at(0.5).instance_rgb(0), None);
+    assert_eq!(point.rgb_of_instance(0, &point.pose_at(0.5)), Vec3::new(8.0, 4.0, 2.0));
+    assert!(sphere.instances.is_empty());
+    assert_eq!(candelabra::pipeline::frames_of(&sphere), (1..=25).collect::<Vec<_>>());
 }

@@ -113,7 +113,14 @@ impl Stage {
         self.scene.meshes.push(Mesh { material, ..mesh });
         let mesh = self.scene.meshes.len() as u32 - 1;
         let path = format!("/mesh_{}", self.scene.instances.len());
-        self.scene.instances.push(Instance { path, node, mesh, shaping: None, forced: false });
+        self.scene.instances.push(Instance {
+            path,
+            node,
+            mesh,
+            values: None,
+            shaping: None,
+            forced: false,
+        });
         self.scene.instances.last_mut().unwrap()
     }
 
@@ -142,7 +149,7 @@ impl Stage {
     /// Puts a light at a new node.
     pub fn light(&mut self, kind: LightKind, place: Trs) -> &mut Light {
         let node = self.node(place);
-        self.scene.lights.push(Light { node, kind, range_m: None, forced: false });
+        self.scene.lights.push(Light { node, kind, values: None, range_m: None, forced: false });
         self.scene.lights.last_mut().unwrap()
     }
 

@@ -64,6 +64,7 @@ fn print_requirements(out: &mut impl Write, needs: &Requirements) -> Result<()> 
         (needs.mesh_lights, "mesh lights"),
         (needs.textured_mesh_lights, "textured mesh lights"),
         (needs.shaped_lights, "emission profiles"),
+        (needs.varying_lights, "lights that vary"),
         (needs.spheres, "sphere lights"),
         (needs.points, "point lights"),
         (needs.spots, "spot lights"),

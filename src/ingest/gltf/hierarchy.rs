@@ -6,7 +6,7 @@ use super::lights::{self, Placed};
 use super::{Output, Source, animation, cameras, instancing};
 use crate::ingest::error::Fault;
 use crate::ingest::paths::{PrimPaths, component};
-use crate::scene::{Channel, Instance, Node, Shaping, Trs};
+use crate::scene::{Channel, Instance, Light, Node, Shaping, Trs};
 use glam::{DAffine3, DMat4, DQuat, DVec3};
 use gltf::json::{Index, Mesh, Node as Row};
 
@@ -133,7 +133,9 @@ impl Walk<'_> {
             cameras::compile(self.source, output, camera, row, node, &object)?;
         }
         let lux = UsdLux::of(&row.extras, &object)?;
-        let light = lights::of_node(self.source, output, number, lux.as_ref(), node, &object)?;
+        let mut values = lights::values(lux.as_ref(), &object)?;
+        let light = lights::of_node(self.source, output, number, lux.as_ref(), node, &object)?
+            .map(|light| Light { values: values.take(), ..light });
         let has_light = light.is_some();
         output.scene.lights.extend(light);
         let shaping = lights::shaping(lux.as_ref(), &object)?;
@@ -145,12 +147,13 @@ impl Walk<'_> {
             }
             return Ok(());
         };
-        let placed = Placed { lux: lux.as_ref(), shaping, forced, has_light, object: &object };
+        let (lux, values, object) = (lux.as_ref(), values.as_ref(), object.as_str());
+        let placed = Placed { lux, shaping, values, forced, has_light, object };
         let Some(instances) = instances else {
             return self.put_mesh(output, mesh, node, &placed);
         };
         for (i, local) in
-            instancing::transforms(self.source, output, instances, &object)?.into_iter().enumerate()
+            instancing::transforms(self.source, output, instances, object)?.into_iter().enumerate()
         {
             let path = format!("{}[{i}]", output.scene.nodes[node as usize].path);
             let child = self.push(output, Node::fixed(path, Some(node), local))?;
@@ -175,7 +178,8 @@ impl Walk<'_> {
                 && material.emission_texture.is_none()
             {
                 let sphere = lights::sphere(material, radius, node, placed);
-                output.scene.lights.push(sphere);
+                let values = placed.copy_values(output)?;
+                output.scene.lights.push(Light { values, ..sphere });
                 return Ok(());
             }
             output.notes.add(
@@ -185,8 +189,8 @@ impl Walk<'_> {
         }
         let compiled = self.meshes.primitives(self.source, output, mesh)?;
         let row = &self.source.document.meshes[mesh.value()];
-        for (i, &compiled) in compiled.iter().enumerate() {
-            let Some(compiled) = compiled else { continue };
+        for (i, &mesh) in compiled.iter().enumerate() {
+            let Some(mesh) = mesh else { continue };
             let above = output.scene.nodes[node as usize].path.clone();
             // A lone mesh is the node's prim; several, or one beside a light, are below it.
             let own = usd_path(&row.primitives[i].extras);
@@ -200,7 +204,13 @@ impl Walk<'_> {
             let (shaping, forced): (Option<Shaping>, bool) = (placed.shaping, placed.forced);
             let bytes = size_of::<Instance>() + 2 * path.len();
             output.budget.take(bytes as u64, || placed.object.to_string())?;
-            output.scene.instances.push(Instance { path, node, mesh: compiled, shaping, forced });
+            let values = placed.copy_values(output)?;
+            if values.is_some() && output.scene.material_of(mesh).is_none() {
+                output
+                    .notes
+                    .add(placed.object, "its light varies, but its mesh has no material; dark");
+            }
+            output.scene.instances.push(Instance { path, node, mesh, values, shaping, forced });
         }
         Ok(())
     }

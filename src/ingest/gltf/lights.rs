@@ -1,19 +1,24 @@
 //! Lights that are not meshes: `KHR_lights_punctual`, and what `extras.usdLux` adds.
 
-use super::document::{UsdLux, reals};
+use super::document::{UsdLux, UsdValues, reals};
 use super::{Output, Source};
 use crate::ingest::error::Fault;
 use crate::ingest::image::{self, Coding};
 use crate::math::color::Rgb;
-use crate::scene::{Light, LightKind, Material, Shaping, Texture, Wrap};
+use crate::scene::{Interpolation, Keys, Light, LightKind, Material, Shaping, Texture, Wrap};
 use gltf::json::extensions::scene::khr_lights_punctual::{Light as Row, Type};
 use gltf::json::validation::Checked;
+
+/// More keys than this are refused: half a day of frames at 24 a second.
+const MOST_KEYS: usize = 1 << 20;
 
 /// What a node says of the meshes at it.
 #[derive(Clone, Copy)]
 pub(super) struct Placed<'a> {
     pub lux: Option<&'a UsdLux>,
     pub shaping: Option<Shaping>,
+    /// Of the node's light, unless that is no mesh.
+    pub values: Option<&'a Keys<Rgb>>,
     pub forced: bool,
     /// Whether a light has the node's path already.
     pub has_light: bool,
@@ -33,9 +38,16 @@ impl Placed<'_> {
             radius => Ok(radius),
         }
     }
+
+    /// A copy of the values for one more light.
+    pub(super) fn copy_values(&self, output: &mut Output) -> Result<Option<Keys<Rgb>>, Fault> {
+        let bytes = self.values.map_or(0, |keys| keys.times_s.len() * size_of::<(f32, Rgb)>());
+        output.budget.take(bytes as u64, || self.object.to_string())?;
+        Ok(self.values.cloned())
+    }
 }
 
-/// The light at a node, other than its meshes.
+/// The light at a node, other than its meshes; constant.
 pub(super) fn of_node(
     source: &Source,
     output: &mut Output,
@@ -44,11 +56,8 @@ pub(super) fn of_node(
     node: u32,
     object: &str,
 ) -> Result<Option<Light>, Fault> {
-    if lux.is_some_and(|lux| lux.values.is_some()) {
-        output.notes.add(object, "animated light values are not read; the light is constant");
-    }
     let forced = lux.is_some_and(|lux| lux.force);
-    let light = |kind, range_m| Some(Light { node, kind, range_m, forced });
+    let light = |kind, range_m| Some(Light { node, kind, values: None, range_m, forced });
     if let Some(lux) = lux.filter(|lux| lux.kind == "DomeLight") {
         return Ok(light(dome(source, output, lux, object)?, None));
     }
@@ -98,6 +107,30 @@ fn strength(row: &Row, object: &str) -> Result<Rgb, Fault> {
     }
 }
 
+/// The strength over time that `extras.usdLux` gives, in the light's own unit.
+pub(super) fn values(lux: Option<&UsdLux>, object: &str) -> Result<Option<Keys<Rgb>>, Fault> {
+    let Some(UsdValues { times, rgb }) = lux.and_then(|lux| lux.values.as_ref()) else {
+        return Ok(None);
+    };
+    let fault =
+        |problem: String| Err(Fault::new(object, format!("extras.usdLux.values: {problem}")));
+    if times.is_empty() || times.len() > MOST_KEYS {
+        return fault(format!("{} keys are not 1 to {MOST_KEYS}", times.len()));
+    }
+    if times.len() != rgb.len() {
+        return fault(format!("{} times and {} rgb values", times.len(), rgb.len()));
+    }
+    let times_s: Vec<f32> = times.iter().map(|time| time.f32()).collect();
+    if !times_s.is_sorted_by(|before, after| before < after) {
+        return fault("its times do not ascend".into());
+    }
+    let values: Vec<Rgb> = rgb.iter().map(|&rgb| reals(rgb).into()).collect();
+    if values.iter().any(|value| value.min_element() < 0.0) {
+        return fault("an rgb value is negative".into());
+    }
+    Ok(Some(Keys { times_s, values, interpolation: Interpolation::Linear }))
+}
+
 /// The emission profile that `extras.usdLux` gives.
 pub(super) fn shaping(lux: Option<&UsdLux>, object: &str) -> Result<Option<Shaping>, Fault> {
     let Some(shaping) = lux.and_then(|lux| lux.shaping.as_ref()) else { return Ok(None) };
@@ -116,11 +149,11 @@ pub(super) fn shaping(lux: Option<&UsdLux>, object: &str) -> Result<Option<Shapi
     }))
 }
 
-/// The sphere light that a tessellated mesh of this material stands for.
+/// The sphere light that a tessellated mesh of this material stands for; constant.
 pub(super) fn sphere(material: &Material, radius: f32, node: u32, placed: &Placed) -> Light {
     let radiance_nits = material.emission_nits;
     let kind = LightKind::Sphere { radiance_nits, radius, shaping: placed.shaping };
-    Light { node, kind, range_m: None, forced: placed.forced }
+    Light { node, kind, values: None, range_m: None, forced: placed.forced }
 }
 
 fn dome(

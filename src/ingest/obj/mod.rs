@@ -66,7 +66,8 @@ pub(super) fn load(path: &Path) -> Result<Scene, Fault> {
         scene.nodes.push(Node::fixed(path.clone(), None, Trs::default()));
         let mesh_index = scene.meshes.len() as u32;
         scene.meshes.push(mesh);
-        let instance = Instance { path, node, mesh: mesh_index, shaping: None, forced: false };
+        let instance =
+            Instance { path, node, mesh: mesh_index, values: None, shaping: None, forced: false };
         scene.instances.push(instance);
     }
     if scene.meshes.is_empty() {

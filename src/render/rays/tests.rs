@@ -42,7 +42,14 @@ fn scene(meshes: Vec<Mesh>, placed: &[(u32, Trs)]) -> Scene {
     for (i, &(mesh, local)) in placed.iter().enumerate() {
         let path = format!("/prim_{i}");
         scene.nodes.push(Node::fixed(&path, None, local));
-        scene.instances.push(Instance { path, node: i as u32, mesh, shaping: None, forced: false });
+        scene.instances.push(Instance {
+            path,
+            node: i as u32,
+            mesh,
+            values: None,
+            shaping: None,
+            forced: false,
+        });
     }
     scene
 }

@@ -26,6 +26,7 @@ fn scene_of(mesh: Mesh, material: Material, scale: DVec3) -> Scene {
             path: "/square".into(),
             node: 0,
             mesh: 0,
+            values: None,
             shaping: None,
             forced: false,
         }],

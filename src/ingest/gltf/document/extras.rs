@@ -42,7 +42,14 @@ pub(in crate::ingest::gltf) struct UsdLux {
     pub texture: Option<String>,
     #[serde(default)]
     pub force: bool,
-    pub values: Option<serde::de::IgnoredAny>,
+    pub values: Option<UsdValues>,
+}
+
+/// `extras.usdLux.values`: the light's strength over time.
+#[derive(Deserialize)]
+pub(in crate::ingest::gltf) struct UsdValues {
+    pub times: Vec<Real>,
+    pub rgb: Vec<[Real; 3]>,
 }
 
 /// `extras.usdLux.shaping`: UsdLux ShapingAPI, degrees.

@@ -29,7 +29,7 @@ fn with_sphere(radius: f32, at: DVec3, scale: f64) -> Scene {
     let local = parts(at, DQuat::IDENTITY, DVec3::splat(scale));
     scene.nodes.push(Node::fixed("/lamp", None, local));
     let kind = LightKind::Sphere { radiance_nits: Rgb::ONE, radius, shaping: None };
-    scene.lights.push(Light { node: 0, kind, range_m: None, forced: false });
+    scene.lights.push(Light { node: 0, kind, values: None, range_m: None, forced: false });
     scene
 }
 
