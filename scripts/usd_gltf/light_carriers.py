@@ -91,7 +91,7 @@ class LightCarriers:
         if light.type == "SphereLight":
             extras["radius"] = number(light.size["radius"])
         self._animated(extras, nits)
-        material = self.materials.light_material(Emission(_first(nits), texture))
+        material = self.materials.light_material(Emission(_first(nits), texture, nits.ndim == 2))
         primitive = {**self._tessellated(light.type, size, texture is not None), "material": material}
         node["mesh"] = self.document.shared("meshes", {"name": light.type, "primitives": [primitive]})
 

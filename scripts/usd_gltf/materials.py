@@ -25,6 +25,8 @@ class Emission:
 
     rgb: np.ndarray
     texture: dict | None = None
+    varies: bool = False
+    """Whether `rgb` is only the first frame's: black, it still needs its texture."""
 
 
 @dataclass
@@ -130,8 +132,8 @@ class Materials:
             if scale > 1.0:
                 extension = self.document.use("KHR_materials_emissive_strength")
                 material.setdefault("extensions", {})[extension] = {"emissiveStrength": number(scale)}
-            if emission.texture is not None:
-                material["emissiveTexture"] = emission.texture
+        if emission.texture is not None and (strength > 0.0 or emission.varies):
+            material["emissiveTexture"] = emission.texture
         if double_sided:
             material["doubleSided"] = True
         return self.document.shared("materials", material)

@@ -86,7 +86,7 @@ class MeshSource:
             if not any(glow.glow):
                 why = f"{piece.look.path} does not glow, and materialGlowTintsLight multiplies by its glow"
                 materials.report.warn(light.path, "mesh light emits nothing", why)
-            emission = Emission(first * np.array(glow.glow), glow.texture)
+            emission = Emission(first * np.array(glow.glow), glow.texture, rgb.ndim == 2)
             if light.material_sync == "noMaterialResponse":
                 index = materials.light_material(emission, piece.double_sided)
             else:

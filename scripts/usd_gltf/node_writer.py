@@ -72,6 +72,8 @@ class NodeWriter:
             camera, extras = prim.camera
             node["camera"] = self.document.shared("cameras", camera)
             node["extras"]["usdCamera"] = extras
+        if prim.fog is not None:
+            node["extras"]["usdFog"] = prim.fog
         if prim.light is not None:
             self.carriers.carry(prim.light, node, world, prim.mesh)
         elif prim.mesh is not None:

@@ -14,6 +14,7 @@ from pxr import Usd, UsdGeom, UsdLux, UsdShade
 
 from . import gprims
 from .cameras import read_camera
+from .fog import read_fog
 from .instancers import Placements, read_placements
 from .light_inputs import Light, light_type, read_light
 from .mesh import MeshReader, MeshSource
@@ -37,6 +38,7 @@ class Prim:
     mesh: MeshSource | None = None
     light: Light | None = None
     camera: tuple[dict, dict] | None = None
+    fog: dict | None = None
     instances: list[tuple[Prim, Placements]] = field(default_factory=list)
     children: list[Prim] = field(default_factory=list)
     lit: bool = False
@@ -45,7 +47,7 @@ class Prim:
     @property
     def is_empty(self) -> bool:
         """Whether nothing would be exported."""
-        return not (self.mesh or self.light or self.camera or self.instances or self.children)
+        return not (self.mesh or self.light or self.camera or self.fog or self.instances or self.children)
 
 
 class PrimTree:
@@ -141,10 +143,12 @@ class PrimTree:
         return column(xformable.GetLocalTransformation(self.frames.first)), resets
 
     def _content(self, prim: Usd.Prim, compiled: Prim) -> None:
-        """What the prim itself is: a mesh, a light, a camera, or something without a carrier."""
+        """What the prim itself is: a mesh, a light, a camera, fog, or something without a carrier."""
         path = prim.GetPath()
         kind = str(prim.GetTypeName())
         geometry_light = self._geometry_lights.get(str(path))
+        if kind == "Volume":
+            compiled.fog = read_fog(prim, self.frames, self.report)
         if prim.IsA(UsdGeom.Mesh) or kind in gprims.TYPES:
             compiled.mesh = self.meshes.read(prim)
             light_prim = geometry_light or prim
@@ -160,7 +164,7 @@ class PrimTree:
             compiled.light = self._light(prim, light_type(prim))
         elif prim.IsA(UsdLux.LightFilter):
             self.report.warn(path, kind, "light filters have no carrier")
-        elif prim.IsA(UsdGeom.Gprim) or kind in ("Skeleton", "Volume"):
+        elif compiled.fog is None and (prim.IsA(UsdGeom.Gprim) or kind in ("Skeleton", "Volume")):
             self.report.warn(path, kind, "this kind of geometry has no carrier; it is left out")
         elif kind and not prim.GetPrimTypeInfo().GetSchemaType():
             self.report.warn(path, f"unknown type {kind}", "no schema is registered for it")

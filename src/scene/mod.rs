@@ -12,6 +12,7 @@
 //! | [`materials`](Scene::materials), [`textures`](Scene::textures) | how a surface reflects and emits |
 //! | [`instances`](Scene::instances) | a mesh put at a node: what a ray can hit |
 //! | [`lights`](Scene::lights) | lights that are not meshes: points, spots, spheres, suns, domes |
+//! | [`medium`](Scene::medium) | the fog that fills it, or a box of it; one or none |
 //! | [`cameras`](Scene::cameras) | a view from a node |
 //!
 //! Units: metres, seconds, radians; +Y is up. Emission is in the file's own photometric numbers
@@ -21,6 +22,7 @@
 mod camera;
 mod light;
 mod material;
+mod medium;
 mod mesh;
 mod pose;
 mod requirements;
@@ -31,6 +33,7 @@ mod values;
 pub use camera::Camera;
 pub use light::{Light, LightKind, Shaping};
 pub use material::{AlphaMode, Material};
+pub use medium::{FogBox, Medium};
 pub use mesh::{Instance, Mesh};
 pub use pose::{Channel, Interpolation, Keys, Node, Pose, Trs};
 pub use requirements::Requirements;
@@ -58,6 +61,8 @@ pub struct Scene {
     pub instances: Vec<Instance>,
     /// Lights that are not meshes.
     pub lights: Vec<Light>,
+    /// The fog in it, if there is any.
+    pub medium: Option<Medium>,
     /// Cameras, in the file's order.
     pub cameras: Vec<Camera>,
     /// How frame numbers map to seconds.

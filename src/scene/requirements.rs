@@ -34,6 +34,8 @@ pub struct Requirements {
     pub normal_maps: usize,
     /// Images.
     pub textures: usize,
+    /// Homogeneous fog.
+    pub fog: usize,
     /// Cameras with a lens.
     pub lenses: usize,
 }
@@ -72,6 +74,7 @@ impl Requirements {
             needs.cutouts += usize::from(material.alpha_mode != AlphaMode::Opaque);
             needs.normal_maps += usize::from(material.normal_texture.is_some());
         }
+        needs.fog = usize::from(scene.medium.is_some());
         needs.lenses = scene.cameras.iter().filter(|c| c.lens_radius_m > 0.0).count();
         needs
     }

@@ -5,6 +5,8 @@ import math
 import numpy as np
 import pytest
 
+from conftest import HEADER
+
 CM_Z_UP = '#usda 1.0\n(\n    metersPerUnit = 0.01\n    upAxis = "Z"\n)\n'
 
 
@@ -221,8 +223,14 @@ def test_bad_emission_is_reported_and_never_written(export, bad):
     assert "NaN" not in str(Gltf(result.path).json["materials"])
 
 
-def test_force_is_carried(gltf):
-    assert gltf('def RectLight "L" { custom bool candelabra:force = 1 }').lux("/L")["force"] is True
+LIGHTS = ["RectLight", "DiskLight", "SphereLight", "CylinderLight", "DistantLight", "DomeLight", "DomeLight_1"]
+
+
+@pytest.mark.parametrize("kind", LIGHTS)
+@pytest.mark.parametrize("force", [0, 1])
+def test_force_is_carried(gltf, kind, force):
+    lux = gltf(f'def {kind} "L" {{ custom bool candelabra:force = {force} }}').lux("/L")
+    assert lux.get("force", False) is bool(force)
 
 
 def test_lights_without_a_carrier_are_reported(export):
@@ -273,6 +281,19 @@ def test_animated_light_values(gltf):
     grows = np.array(scene.lux("/Grows")["values"]["rgb"])[:, 0]
     assert grows == pytest.approx([1, 1 / 2.25, 1 / 4])
     assert scene.json["asset"]["extras"]["usd"]["startTimeCode"] == 1001
+
+
+def test_a_textured_light_that_is_dark_at_first_keeps_its_picture(gltf, tmp_path):
+    from PIL import Image
+
+    Image.new("RGB", (2, 2), (255, 0, 0)).save(tmp_path / "t.png")
+    light = 'def RectLight "L" {{ asset inputs:texture:file = @t.png@\n float inputs:intensity{} }}'
+    varying = gltf('#usda 1.0\n(\n startTimeCode = 1\n endTimeCode = 2\n)\n'
+                   + light.format(".timeSamples = { 1: 0, 2: 3 }"))  # fmt: skip
+    assert "emissiveTexture" in varying.material("/L")
+    assert "emissiveFactor" not in varying.material("/L")
+    assert varying.lux("/L")["values"]["rgb"] == [[0] * 3, [3] * 3]
+    assert "emissiveTexture" not in gltf(HEADER + light.format(" = 0")).material("/L")
 
 
 def test_a_textured_rect_shows_its_picture_upright_from_the_front(gltf, tmp_path):

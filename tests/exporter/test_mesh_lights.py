@@ -69,6 +69,17 @@ def test_a_geometry_light_lights_its_mesh(gltf):
     assert scene.lux("/M")["type"] == "MeshLight"
 
 
+@pytest.mark.parametrize(
+    "prims",
+    [
+        f'def Mesh "M" (prepend apiSchemas = ["MeshLightAPI"]) {{ {QUAD} custom bool candelabra:force = 1 }}',
+        f'def Mesh "M" {{ {QUAD} }}\ndef GeometryLight "G" {{ rel geometry = </M>\n custom bool candelabra:force = 1 }}',
+    ],
+)
+def test_force_is_carried(gltf, prims):
+    assert gltf(prims).lux("/M")["force"] is True
+
+
 def test_subsets_glow_each_by_its_material(gltf):
     scene = gltf(
         NEON

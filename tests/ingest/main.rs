@@ -1,6 +1,7 @@
 //! Files in, a scene index out.
 
 mod files;
+mod fog;
 mod gltf;
 mod malformed;
 mod obj;

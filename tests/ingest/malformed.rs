@@ -169,6 +169,18 @@ fn assert_promises_are_kept(scene: &candelabra::scene::Scene) {
         assert!(mesh.uv_sets.iter().all(|set| set.is_empty() || set.len() == count));
         assert!(mesh.material.is_none_or(|m| (m as usize) < scene.materials.len()));
     }
+    let keys = scene.lights.iter().filter_map(|light| light.values.as_ref());
+    for keys in keys.chain(scene.instances.iter().filter_map(|i| i.values.as_ref())) {
+        assert!(!keys.times_s.is_empty() && keys.times_s.len() == keys.values.len());
+        assert!(keys.times_s.is_sorted_by(|a, b| a < b));
+        assert!(keys.values.iter().all(|v| v.is_finite() && v.min_element() >= 0.0));
+    }
+    if let Some(medium) = &scene.medium {
+        assert!(medium.scattering.is_finite() && medium.scattering.min_element() >= 0.0);
+        assert!(medium.absorption.is_finite() && medium.absorption.min_element() >= 0.0);
+        assert!(medium.anisotropy.abs() < 1.0);
+        assert!(medium.region.is_none_or(|region| region.min.cmplt(region.max).all()));
+    }
     let mut paths: Vec<_> = (0..scene.instances.len()).map(|i| scene.instance_path(i)).collect();
     paths.extend((0..scene.lights.len()).map(|i| scene.light_path(i)));
     paths.sort_unstable();
@@ -210,7 +222,12 @@ fn rich() -> files::File {
         }}),
     );
     file.add("cameras", json!({"type": "perspective", "perspective": {"yfov": 0.7}}));
-    file.add("nodes", json!({"camera": 0, "children": [1]}));
+    let fog = json!({"extinction": [0.1, 0.2, 0.3], "albedo": [0.5, 1, 0], "anisotropy": 0.75,
+        "min": [-1, -1, -1], "max": [1, 1, 1]});
+    file.add("nodes", json!({"camera": 0, "children": [1], "extras": {"usdFog": fog}}));
+    file.lux(
+        json!({"type": "SphereLight", "values": {"times": [0, 1], "rgb": [[1, 2, 3], [0, 0, 4]]}}),
+    );
     file.json["scenes"][0]["nodes"] = json!([0, 2]);
     file.json["accessors"][0]["sparse"] = json!({
         "count": 1,

@@ -1,12 +1,14 @@
-//! Lights that move: one tree a frame over those, above one tree over all that stand still.
+//! Lights that move or vary: one tree a frame over those, above one tree over all others.
 
 use crate::rooms;
-use crate::stage::{Set, Stage, at, by, glow};
+use crate::stage::{Set, Stage, aimed, at, by, facing, glow, picture};
 use crate::statistics::Estimate;
 use crate::strategies::{SIZE, disagreement, render};
 use candelabra::light_tree::{FrameTree, Receiver};
 use candelabra::render::{LightStrategy, RenderDelegate, RenderSettings};
-use candelabra::scene::{Channel, Interpolation, Keys, LightKind, Scene, Trs};
+use candelabra::scene::{
+    Channel, Interpolation, Keys, Light, LightKind, Material, Scene, Shaping, Trs,
+};
 use glam::{DAffine3, DMat3, DVec3, Quat, Vec3};
 
 pub const FRAMES: [i32; 3] = [1, 13, 25];
@@ -60,6 +62,65 @@ fn frozen(stage: &mut Stage, frame: i32) {
         node.local = Trs::Matrix(DAffine3 { matrix3, translation });
         (node.parent, node.channels) = (None, Vec::new());
     }
+    for number in 0..scene.instances.len() {
+        let rgb = scene.rgb_of_instance(number as u32, &pose);
+        let instance = &mut scene.instances[number];
+        if instance.values.take().is_some() {
+            // On a stage every mesh has its own material.
+            let material = scene.meshes[instance.mesh as usize].material.unwrap();
+            scene.materials[material as usize].emission_nits = rgb;
+        }
+    }
+    for number in 0..scene.lights.len() {
+        let rgb = scene.rgb_of_light(number as u32, &pose);
+        scene.lights[number].values = None;
+        match &mut scene.lights[number].kind {
+            LightKind::Point { intensity_cd } | LightKind::Spot { intensity_cd, .. } => {
+                *intensity_cd = rgb
+            }
+            LightKind::Sphere { radiance_nits, .. } | LightKind::Dome { radiance_nits, .. } => {
+                *radiance_nits = rgb
+            }
+            LightKind::Distant { irradiance_lux, .. } => *irradiance_lux = rgb,
+        }
+    }
+}
+
+/// Strengths at 0, 0.5 and 1 seconds.
+fn keys(values: [Vec3; 3]) -> Option<Keys<Vec3>> {
+    let times_s = vec![0.0, 0.5, 1.0];
+    Some(Keys { times_s, values: values.into(), interpolation: Interpolation::Linear })
+}
+
+/// A room in which a light of every kind flickers beside one that does not. Their constants are not
+/// what any frame shows; some are dark at first, some in the end, and one moves as well.
+fn flicker() -> Stage {
+    let mut stage = carousel();
+    let (dark, dim, bright) = (Vec3::ZERO, Vec3::new(0.5, 1.0, 2.0), Vec3::new(9.0, 6.0, 3.0));
+    let panel = stage.quad([0.4; 2], glow(dark), facing(DVec3::new(-1.0, 1.2, 0.5), DVec3::ZERO));
+    panel.values = keys([dark, dim, bright]);
+    let checks = picture([2, 2], false, |x, y| [(x + y) as f32, 0.5, x as f32]);
+    let emission_texture = stage.texture(checks);
+    let textured = Material { emission_texture, ..glow(Vec3::ONE) };
+    let place = facing(DVec3::new(1.0, 1.0, 0.6), DVec3::ZERO);
+    stage.quad([0.5; 2], textured, place).values = keys([bright, dark, dim]);
+    let shaping = Shaping::Khr { inner_rad: 0.2, outer_rad: 0.7 };
+    let spot = LightKind::Spot { intensity_cd: Vec3::splat(50.0), shaping };
+    stage.light(spot, aimed(DVec3::new(0.2, 1.4, 0.9), DVec3::ZERO)).values =
+        keys([dim, dim, dark]);
+    let radiance_nits = Vec3::splat(100.0);
+    let sphere = LightKind::Sphere { radiance_nits, radius: 0.1, shaping: None };
+    stage.light(sphere, at(DVec3::new(-0.5, 0.4, 0.8))).values = keys([dim, bright, dark]);
+    let sun = LightKind::Distant { irradiance_lux: Vec3::splat(9.0), angle_rad: 0.1 };
+    let place = aimed(DVec3::new(1.0, 2.0, 1.0), DVec3::ZERO);
+    stage.light(sun, place).values = keys([dark, 0.3 * dim, 0.1 * dim]);
+    let dome = LightKind::Dome { radiance_nits: Vec3::splat(9.0), texture: None };
+    stage.light(dome, at(DVec3::ZERO)).values = keys([0.02 * bright, dark, 0.1 * dim]);
+    let turning = stage.scene.moving_nodes();
+    let moved = |light: &&mut Light| turning[light.node as usize];
+    let lamp = stage.scene.lights.iter_mut().find(moved).unwrap();
+    lamp.values = keys([dim, bright, dark]);
+    stage
 }
 
 fn settings(strategy: LightStrategy, seed: u32) -> RenderSettings {
@@ -95,6 +156,34 @@ fn every_frame_is_the_picture_of_its_moment() {
         pictures.push(tree);
     }
     // And it does move.
+    for pair in pictures.windows(2) {
+        let apart = Estimate::of_picture(&pair[0]).distance(&Estimate::of_picture(&pair[1]));
+        assert!(apart > 10.0, "{apart}");
+    }
+}
+
+#[test]
+fn every_frame_of_a_flicker_is_the_picture_of_the_constant_lights_of_its_moment() {
+    // One of them between two keys.
+    const FRAMES: [i32; 3] = [1, 10, 25];
+    let stage = flicker();
+    let set = Set::of(&stage.scene, &FRAMES);
+    let varying = set.emitters.lights().iter().filter(|light| light.varies);
+    assert_eq!(varying.count(), 5, "a sun and a dome are no emitters");
+    let mut pictures = Vec::new();
+    for frame in FRAMES {
+        let mut still = flicker();
+        frozen(&mut still, frame);
+        let still = Set::of(&still.scene, &[]);
+        assert_eq!(still.emitters.static_count(), still.emitters.len());
+        let constant = render(&still, settings(LightStrategy::Tree, 10), 1);
+        for (strategy, seed) in [(LightStrategy::Tree, 20), (LightStrategy::Uniform, 30)] {
+            let varying = render(&set, settings(strategy, seed), frame);
+            let wrong = disagreement(&varying, &constant);
+            assert!(wrong.is_none(), "frame {frame}, {strategy:?}: {}", wrong.unwrap());
+        }
+        pictures.push(constant);
+    }
     for pair in pictures.windows(2) {
         let apart = Estimate::of_picture(&pair[0]).distance(&Estimate::of_picture(&pair[1]));
         assert!(apart > 10.0, "{apart}");

@@ -75,6 +75,7 @@ fn print_requirements(out: &mut impl Write, needs: &Requirements) -> Result<()> 
         (needs.textures, "textures"),
         (needs.cutouts, "cut-out materials"),
         (needs.normal_maps, "normal maps"),
+        (needs.fog, "fog"),
         (needs.lenses, "camera lenses"),
     ];
     writeln!(out, "  requires")?;

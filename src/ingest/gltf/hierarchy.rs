@@ -1,9 +1,9 @@
 //! Nodes, parents first, and what stands at them.
 
-use super::document::{Real, Transform, UsdLux, label, usd_path};
+use super::document::{Real, Transform, UsdFog, UsdLux, label, usd_path};
 use super::geometry::Meshes;
 use super::lights::{self, Placed};
-use super::{Output, Source, animation, cameras, instancing};
+use super::{Output, Source, animation, cameras, fog, instancing};
 use crate::ingest::error::Fault;
 use crate::ingest::paths::{PrimPaths, component};
 use crate::scene::{Channel, Instance, Light, Node, Shaping, Trs};
@@ -40,17 +40,20 @@ pub(super) fn compile(source: &Source, output: &mut Output) -> Result<(), Fault>
         uniform: Vec::new(),
     };
     // A stack, so that no depth of the hierarchy is a depth of calls.
-    let roots = roots(source, output);
+    let roots = roots(source, output)?;
     let open = |row: usize, parent, visible| Open { row, parent, visible };
     let mut stack: Vec<Open> = roots.into_iter().rev().map(|row| open(row, None, true)).collect();
     while let Some(Open { row: number, parent, visible }) = stack.pop() {
         let row = &source.document.nodes[number];
         let visible = visible && !source.document.beside.hidden.contains(&number);
         let node = walk.place(output, number, row, parent)?;
+        let object = label("node", number, row.name.as_deref());
         if visible {
-            walk.furnish(output, number, row, node)?;
-        } else if row.mesh.is_some() || source.document.light_at(number).is_some() {
-            let object = label("node", number, row.name.as_deref());
+            walk.furnish(output, number, row, node, &object)?;
+        } else if row.mesh.is_some()
+            || source.document.light_at(number).is_some()
+            || UsdFog::of(&row.extras, &object)?.is_some()
+        {
             output.notes.add(object, "is hidden (KHR_node_visibility); left out");
         }
         let children = row.children.iter().flatten().rev();
@@ -59,24 +62,25 @@ pub(super) fn compile(source: &Source, output: &mut Output) -> Result<(), Fault>
     Ok(())
 }
 
-/// The roots of the default scene, else of the first, else all.
-fn roots(source: &Source, output: &mut Output) -> Vec<usize> {
+/// The roots of the default scene, whose fog it adds; else of the first, else all.
+fn roots(source: &Source, output: &mut Output) -> Result<Vec<usize>, Fault> {
     let document = source.document;
     let default = document.scene.map_or(0, |scene| scene.value());
     match document.scenes.get(default) {
         Some(scene) => {
+            fog::of_scene(output, default, scene)?;
             if document.scenes.len() > 1 {
                 let object = format!("scene {default}");
                 output.notes.add(object, "only this one of the file's scenes is read");
             }
-            scene.nodes.iter().map(Index::value).collect()
+            Ok(scene.nodes.iter().map(Index::value).collect())
         }
         None => {
             let mut is_root = vec![true; document.nodes.len()];
             for child in document.nodes.iter().flat_map(|node| node.children.iter().flatten()) {
                 is_root[child.value()] = false;
             }
-            (0..is_root.len()).filter(|&i| is_root[i]).collect()
+            Ok((0..is_root.len()).filter(|&i| is_root[i]).collect())
         }
     }
 }
@@ -120,25 +124,26 @@ impl Walk<'_> {
         Ok(output.scene.nodes.len() as u32 - 1)
     }
 
-    /// Adds the camera, light and meshes of a node.
+    /// Adds the camera, fog, light and meshes of a node.
     fn furnish(
         &mut self,
         output: &mut Output,
         number: usize,
         row: &Row,
         node: u32,
+        object: &str,
     ) -> Result<(), Fault> {
-        let object = label("node", number, row.name.as_deref());
         if let Some(camera) = row.camera {
-            cameras::compile(self.source, output, camera, row, node, &object)?;
+            cameras::compile(self.source, output, camera, row, node, object)?;
         }
-        let lux = UsdLux::of(&row.extras, &object)?;
-        let mut values = lights::values(lux.as_ref(), &object)?;
-        let light = lights::of_node(self.source, output, number, lux.as_ref(), node, &object)?
+        fog::of_node(output, &row.extras, node, object)?;
+        let lux = UsdLux::of(&row.extras, object)?;
+        let mut values = lights::values(lux.as_ref(), object)?;
+        let light = lights::of_node(self.source, output, number, lux.as_ref(), node, object)?
             .map(|light| Light { values: values.take(), ..light });
         let has_light = light.is_some();
         output.scene.lights.extend(light);
-        let shaping = lights::shaping(lux.as_ref(), &object)?;
+        let shaping = lights::shaping(lux.as_ref(), object)?;
         let forced = lux.as_ref().is_some_and(|lux| lux.force);
         let instances = self.source.document.beside.instances.get(&number);
         let Some(mesh) = row.mesh else {
@@ -147,7 +152,7 @@ impl Walk<'_> {
             }
             return Ok(());
         };
-        let (lux, values, object) = (lux.as_ref(), values.as_ref(), object.as_str());
+        let (lux, values) = (lux.as_ref(), values.as_ref());
         let placed = Placed { lux, shaping, values, forced, has_light, object };
         let Some(instances) = instances else {
             return self.put_mesh(output, mesh, node, &placed);

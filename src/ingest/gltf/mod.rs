@@ -6,6 +6,7 @@ mod buffers;
 mod cameras;
 mod container;
 mod document;
+mod fog;
 mod geometry;
 mod hierarchy;
 mod instancing;

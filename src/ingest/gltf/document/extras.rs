@@ -65,6 +65,25 @@ pub(in crate::ingest::gltf) struct UsdShaping {
     pub focus_tint: [Real; 3],
 }
 
+/// `extras.usdFog`: the homogeneous fog in a node's box, or everywhere.
+#[derive(Deserialize)]
+pub(in crate::ingest::gltf) struct UsdFog {
+    pub extinction: RealOrRgb,
+    pub albedo: Option<[Real; 3]>,
+    #[serde(default)]
+    pub anisotropy: Real,
+    pub min: Option<[Real; 3]>,
+    pub max: Option<[Real; 3]>,
+}
+
+/// One number for all of a colour, or three.
+#[derive(Clone, Copy, Deserialize)]
+#[serde(untagged, expecting = "is neither a 32-bit number nor three of them")]
+pub(in crate::ingest::gltf) enum RealOrRgb {
+    Real(Real),
+    Rgb([Real; 3]),
+}
+
 impl AssetUsd {
     pub(in crate::ingest::gltf) fn of(extras: &Extras) -> Result<Option<AssetUsd>, Fault> {
         member(extras, "usd", "asset")
@@ -86,6 +105,24 @@ impl UsdLux {
         object: &str,
     ) -> Result<Option<UsdLux>, Fault> {
         member(extras, "usdLux", object)
+    }
+}
+
+impl UsdFog {
+    pub(in crate::ingest::gltf) fn of(
+        extras: &Extras,
+        object: &str,
+    ) -> Result<Option<UsdFog>, Fault> {
+        member(extras, "usdFog", object)
+    }
+}
+
+impl RealOrRgb {
+    pub(in crate::ingest::gltf) fn rgb(self) -> [Real; 3] {
+        match self {
+            RealOrRgb::Real(value) => [value; 3],
+            RealOrRgb::Rgb(values) => values,
+        }
     }
 }
 

@@ -9,7 +9,7 @@ mod real;
 mod reference;
 
 pub(super) use beside::{Beside, Channel, Instancing, Target, Transform};
-pub(super) use extras::{AssetUsd, UsdCamera, UsdLux, UsdValues, usd_path};
+pub(super) use extras::{AssetUsd, UsdCamera, UsdFog, UsdLux, UsdValues, usd_path};
 pub(super) use real::{Real, reals};
 
 use crate::ingest::error::Fault;
