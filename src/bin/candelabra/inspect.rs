@@ -46,7 +46,7 @@ fn inspect_scene(out: &mut impl Write, scene: &Scene) -> Result<()> {
     let emitters = Emitters::collect(scene);
     writeln!(
         out,
-        "  emitters    {} of {} lights; {} move",
+        "  emitters    {} of {} lights; {} move or vary",
         emitters.len(),
         emitters.lights().len(),
         emitters.len() - emitters.static_count()
