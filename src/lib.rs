@@ -47,7 +47,7 @@
 //! let frame = tree.at_frame(1001, &leaves)?;
 //! let receiver = Receiver { point: Vec3::ZERO, normal: Vec3::Y };
 //! if let Some(pick) = frame.sample(&receiver, 0.25) {
-//!     assert!(frame.probability(&receiver, pick.emitter) > 0.0);
+//!     assert!(pick.probability > 0.0);
 //! }
 //! # Ok(())
 //! # }
@@ -60,6 +60,7 @@ pub mod emitter;
 pub mod ingest;
 pub mod light_tree;
 pub mod math;
+pub mod measure;
 pub mod pipeline;
 pub mod render;
 pub mod scene;

@@ -23,6 +23,8 @@ pub struct LightBounds {
     /// An estimate of what it contributes: the peak radiant intensity of its emitters, summed. One
     /// scale for all kinds (`I` of a point, `L A` of a triangle). Positive.
     pub energy: f32,
+    /// Beyond this distance it gives no light (glTF's `range`), metres; infinite if it is physical.
+    pub range_m: f32,
 }
 
 impl LightBounds {
@@ -36,6 +38,7 @@ impl LightBounds {
             aabb: parts.iter().fold(Aabb::EMPTY, |all, part| all.union(&part.aabb)),
             cone: Cone::around(&cones),
             energy: parts.iter().map(|part| f64::from(part.energy)).sum::<f64>() as f32,
+            range_m: parts.iter().map(|part| part.range_m).fold(0.0, f32::max),
         }
     }
 
@@ -48,5 +51,6 @@ impl LightBounds {
             && self.cone.theta_e.is_finite()
             && self.energy.is_finite()
             && self.energy > 0.0
+            && self.range_m > 0.0
     }
 }

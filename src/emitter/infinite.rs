@@ -11,6 +11,8 @@ use std::f32::consts::PI;
 pub struct InfiniteLight<'a> {
     /// Index into [`Scene::lights`].
     pub light: usize,
+    /// Whether it is left out of all estimates and sampled at every point.
+    pub forced: bool,
     kind: Kind<'a>,
 }
 
@@ -66,7 +68,7 @@ pub fn infinite_lights<'a>(scene: &'a Scene, pose: &Pose) -> Vec<InfiniteLight<'
     let lights = scene.lights.iter().enumerate();
     let found = lights.filter_map(|(light, row)| {
         let rgb = scene.rgb_of_light(light as u32, pose);
-        Some(InfiniteLight { light, kind: kind(row, rgb)? })
+        Some(InfiniteLight { light, forced: row.forced, kind: kind(row, rgb)? })
     });
     found.collect()
 }

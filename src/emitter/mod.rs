@@ -8,8 +8,10 @@
 //!
 //! This room does not know the tree; which emitter to sample is decided elsewhere.
 
+mod bounding;
 mod dome;
 mod infinite;
+mod mesh_light;
 mod posed;
 mod set;
 mod shaping;
@@ -17,7 +19,9 @@ mod sphere;
 mod texels;
 mod triangle;
 
+pub use bounding::LightOverflow;
 pub use infinite::{InfiniteLight, InfiniteSample, infinite_lights};
-pub use posed::{EmitterHit, LightOverflow, LightSample, MeshPlace, PosedEmitters};
-pub use set::{EmitterRef, Emitters, LightEntry, LightSource};
+pub use mesh_light::MeshLight;
+pub use posed::{EmitterHit, LightSample, MeshPlace, PosedEmitters};
+pub use set::{EmitterPlace, EmitterRef, Emitters, LightEntry, LightSource};
 pub use sphere::WorldSphere;

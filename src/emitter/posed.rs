@@ -1,14 +1,11 @@
-//! Emitters at one time: their bounds, and light from a point of them.
+//! Emitters at one time: light from a point of them.
 
-use super::set::{Emitters, LightSource};
+use super::set::{EmitterPlace, Emitters};
 use super::sphere::WorldSphere;
 use super::triangle::WorldTriangle;
-use crate::bounds::{Aabb, Cone, LightBounds};
-use crate::math::color::{Rgb, luminance};
+use crate::math::color::Rgb;
 use crate::scene::{Instance, Light, LightKind, Material, Pose, Scene, Shaping};
 use glam::{Vec2, Vec3};
-use rayon::prelude::*;
-use std::f32::consts::PI;
 
 /// The emitters of a scene, placed by a pose.
 #[derive(Clone, Copy)]
@@ -19,16 +16,6 @@ pub struct PosedEmitters<'a> {
     pub emitters: &'a Emitters,
     /// Where everything is.
     pub pose: &'a Pose,
-}
-
-/// A light that `f32` cannot hold.
-#[derive(Clone, Debug, thiserror::Error, PartialEq, Eq)]
-#[error(
-    "{path}: its position or its intensity times its area is beyond the range of numbers (3e38); scale it down"
-)]
-pub struct LightOverflow {
-    /// Prim path of the light.
-    pub path: String,
 }
 
 /// Light from a point of an emitter towards a receiver.
@@ -73,91 +60,17 @@ pub struct EmitterHit {
 }
 
 impl<'a> PosedEmitters<'a> {
-    /// The bounds of all emitters that neither move nor vary, or of all others, in their order.
-    ///
-    /// # Errors
-    /// The path of a light whose place or energy is beyond `f32`.
-    pub fn bounds(&self, moving: bool) -> Result<Vec<LightBounds>, LightOverflow> {
-        let split = self.emitters.static_count() as u32;
-        let range = if moving { split..self.emitters.len() as u32 } else { 0..split };
-        range.into_par_iter().map(|emitter| self.bounds_of(emitter)).collect()
-    }
-
-    /// The bounds of one emitter. Energy is peak radiant intensity: `I` of a point, `L A` of a
-    /// triangle, `L pi r^2` of a sphere, in luminance; never quite zero, so that an emitter which a
-    /// transform has flattened keeps its place in the tree.
-    fn bounds_of(&self, emitter: u32) -> Result<LightBounds, LightOverflow> {
-        let light = self.emitters.light_of(emitter);
-        let mut bounds = match light.source {
-            LightSource::Instance(row) => self.bounds_of_triangle(emitter, row),
-            LightSource::Light(row) => self.bounds_of_light(row),
-        };
-        bounds.energy = bounds.energy.max(f32::MIN_POSITIVE);
-        if bounds.is_sound() { Ok(bounds) } else { Err(LightOverflow { path: light.path.clone() }) }
-    }
-
-    fn bounds_of_triangle(&self, emitter: u32, row: u32) -> LightBounds {
-        let instance = &self.scene.instances[row as usize];
-        let material = self.material(instance);
-        let triangle = self.triangle(instance, self.emitters.get(emitter).triangle);
-        let nits = self.scene.rgb_of_instance(row, self.pose);
-        let radiance = nits * self.emitters.texture_mean(emitter);
-        let facing = Cone::flat(
-            triangle.area_normal().normalize_or(Vec3::Z) * self.handedness(instance),
-            material.double_sided,
-        );
-        let cone = match instance.shaping {
-            Some(shaping) if shaping.half_angle_rad() < PI / 2.0 => {
-                Cone::spot(self.aim(instance.node), shaping.half_angle_rad())
-            }
-            _ => facing,
-        };
-        LightBounds {
-            aabb: Aabb::around(triangle.corners),
-            cone,
-            energy: luminance(radiance) * triangle.area(),
-        }
-    }
-
-    fn bounds_of_light(&self, row: u32) -> LightBounds {
-        let light = &self.scene.lights[row as usize];
-        let strength = luminance(self.scene.rgb_of_light(row, self.pose));
-        let here = Vec3::from(self.pose.world(light.node).translation);
-        let aimed = |shaping: &Shaping| Cone::spot(self.aim(light.node), shaping.half_angle_rad());
-        match &light.kind {
-            LightKind::Point { .. } => {
-                LightBounds { aabb: Aabb::around([here]), cone: Cone::ALL, energy: strength }
-            }
-            LightKind::Spot { shaping, .. } => {
-                LightBounds { aabb: Aabb::around([here]), cone: aimed(shaping), energy: strength }
-            }
-            LightKind::Sphere { shaping, .. } => {
-                let sphere = self.sphere(light);
-                LightBounds {
-                    aabb: Aabb { min: here - sphere.radius, max: here + sphere.radius },
-                    cone: shaping.as_ref().map_or(Cone::ALL, aimed),
-                    energy: strength * PI * sphere.radius * sphere.radius,
-                }
-            }
-            LightKind::Distant { .. } | LightKind::Dome { .. } => {
-                unreachable!("lights at infinity are no emitters")
-            }
-        }
-    }
-
     /// Light from an emitter to a receiver; `None` if this point of it gives none.
     pub fn sample(&self, emitter: u32, receiver: Vec3, u: Vec2) -> Option<LightSample> {
-        match self.emitters.light_of(emitter).source {
-            LightSource::Instance(row) => {
-                let instance = &self.scene.instances[row as usize];
-                let number = self.emitters.get(emitter).triangle;
-                let triangle = self.triangle(instance, number);
+        match self.emitters.place_of(emitter) {
+            EmitterPlace::Triangle { instance: row, triangle: number } => {
+                let triangle = self.triangle(&self.scene.instances[row as usize], number);
                 let found = triangle.sample(receiver, u)?;
                 let barycentric = found.barycentric;
                 let point = triangle.at(barycentric);
                 let direction = (point - receiver).try_normalize()?;
                 let radiance =
-                    self.triangle_radiance(emitter, row, &triangle, barycentric, direction);
+                    self.triangle_radiance(row, number, &triangle, barycentric, direction);
                 (radiance != Rgb::ZERO).then_some(LightSample {
                     direction,
                     point,
@@ -168,7 +81,7 @@ impl<'a> PosedEmitters<'a> {
                     on_mesh: Some(MeshPlace { instance: row, triangle: number, barycentric }),
                 })
             }
-            LightSource::Light(row) => self.sample_light(row, receiver, u),
+            EmitterPlace::Light(row) => self.sample_light(row, receiver, u),
         }
     }
 
@@ -235,13 +148,12 @@ impl<'a> PosedEmitters<'a> {
 
     /// Radiance that a ray sees where it has hit an emitter, nits. `direction` is the ray's, unit.
     pub fn radiance(&self, hit: &EmitterHit, direction: Vec3) -> Rgb {
-        match self.emitters.light_of(hit.emitter).source {
-            LightSource::Instance(row) => {
-                let instance = &self.scene.instances[row as usize];
-                let triangle = self.triangle(instance, self.emitters.get(hit.emitter).triangle);
-                self.triangle_radiance(hit.emitter, row, &triangle, hit.barycentric, direction)
+        match self.emitters.place_of(hit.emitter) {
+            EmitterPlace::Triangle { instance, triangle: number } => {
+                let triangle = self.triangle(&self.scene.instances[instance as usize], number);
+                self.triangle_radiance(instance, number, &triangle, hit.barycentric, direction)
             }
-            LightSource::Light(row) => match &self.scene.lights[row as usize] {
+            EmitterPlace::Light(row) => match &self.scene.lights[row as usize] {
                 Light { node, kind: LightKind::Sphere { shaping, .. }, .. } => {
                     let cosine = (-direction).dot(self.aim(*node));
                     self.scene.rgb_of_light(row, self.pose)
@@ -255,13 +167,12 @@ impl<'a> PosedEmitters<'a> {
     /// The density over solid angle with which [`sample`](Self::sample), given this emitter, would
     /// have found the hit from a receiver, 1/sr.
     pub fn pdf(&self, hit: &EmitterHit, receiver: Vec3) -> f32 {
-        match self.emitters.light_of(hit.emitter).source {
-            LightSource::Instance(row) => {
-                let instance = &self.scene.instances[row as usize];
-                let triangle = self.triangle(instance, self.emitters.get(hit.emitter).triangle);
-                triangle.pdf(receiver, hit.point)
+        match self.emitters.place_of(hit.emitter) {
+            EmitterPlace::Triangle { instance, triangle } => {
+                let instance = &self.scene.instances[instance as usize];
+                self.triangle(instance, triangle).pdf(receiver, hit.point)
             }
-            LightSource::Light(row) => match &self.scene.lights[row as usize] {
+            EmitterPlace::Light(row) => match &self.scene.lights[row as usize] {
                 light if matches!(light.kind, LightKind::Sphere { .. }) => {
                     self.sphere(light).pdf(receiver)
                 }
@@ -272,8 +183,8 @@ impl<'a> PosedEmitters<'a> {
 
     fn triangle_radiance(
         &self,
-        emitter: u32,
         row: u32,
+        number: u32,
         triangle: &WorldTriangle,
         barycentric: Vec2,
         direction: Vec3,
@@ -289,7 +200,7 @@ impl<'a> PosedEmitters<'a> {
             let mesh = &self.scene.meshes[instance.mesh as usize];
             if let Some(uvs) = mesh.uv_sets.get(usage.uv_set as usize).filter(|set| !set.is_empty())
             {
-                let corners = mesh.triangles[self.emitters.get(emitter).triangle as usize];
+                let corners = mesh.triangles[number as usize];
                 let [a, b, c] = corners.map(|corner| uvs[corner as usize]);
                 let uv = a + (b - a) * barycentric.x + (c - a) * barycentric.y;
                 let texture = &self.scene.textures[usage.texture as usize];
@@ -302,12 +213,12 @@ impl<'a> PosedEmitters<'a> {
         }
     }
 
-    fn material(&self, instance: &Instance) -> &'a Material {
+    pub(super) fn material(&self, instance: &Instance) -> &'a Material {
         self.scene.material_of(instance.mesh).expect("an emitter has a material")
     }
 
     /// A triangle in world space.
-    fn triangle(&self, instance: &Instance, triangle: u32) -> WorldTriangle {
+    pub(super) fn triangle(&self, instance: &Instance, triangle: u32) -> WorldTriangle {
         let mesh = &self.scene.meshes[instance.mesh as usize];
         let world = self.pose.world(instance.node);
         let corners = mesh.triangles[triangle as usize];
@@ -317,11 +228,11 @@ impl<'a> PosedEmitters<'a> {
     }
 
     /// -1 for an instance whose transform mirrors, whose triangles wind the other way round.
-    fn handedness(&self, instance: &Instance) -> f32 {
+    pub(super) fn handedness(&self, instance: &Instance) -> f32 {
         1f32.copysign(self.pose.world(instance.node).matrix3.determinant())
     }
 
-    fn sphere(&self, light: &Light) -> WorldSphere {
+    pub(super) fn sphere(&self, light: &Light) -> WorldSphere {
         let world = self.pose.world(light.node);
         let radius = match light.kind {
             LightKind::Sphere { radius, .. } => radius,
@@ -332,7 +243,7 @@ impl<'a> PosedEmitters<'a> {
     }
 
     /// Where a node aims: its -Z, unit, world space.
-    fn aim(&self, node: u32) -> Vec3 {
+    pub(super) fn aim(&self, node: u32) -> Vec3 {
         (-Vec3::from(self.pose.world(node).matrix3.z_axis)).normalize_or(-Vec3::Z)
     }
 }

@@ -1,25 +1,43 @@
 //! Which emitters a scene has, in canonical order, and how to find one again from a hit.
 
-use super::texels::TexelMeans;
+use super::mesh_light::{self, MeshLight};
+use crate::math::Similarity;
 use crate::math::color::{Rgb, luminance};
-use crate::scene::{LightKind, Material, Mesh, Scene};
-use rayon::prelude::*;
-use std::sync::OnceLock;
+use crate::scene::{LightKind, Scene};
 
 /// What the tree picks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct EmitterRef {
     /// Its light: a row of [`Emitters::lights`].
     pub light: u32,
-    /// Of a mesh light, its triangle; else 0.
-    pub triangle: u32,
+    /// Of a mesh light, its number among the triangles that emit; else 0.
+    pub own: u32,
+}
+
+/// Where an emitter is in the scene.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum EmitterPlace {
+    /// A triangle of a mesh.
+    Triangle {
+        /// A row of [`Scene::instances`].
+        instance: u32,
+        /// Index into the mesh's triangles.
+        triangle: u32,
+    },
+    /// A row of [`Scene::lights`].
+    Light(u32),
 }
 
 /// Where a light comes from in the scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LightSource {
-    /// A mesh whose material emits: a row of [`Scene::instances`].
-    Instance(u32),
+    /// A mesh whose material emits.
+    Mesh {
+        /// A row of [`Scene::instances`].
+        instance: u32,
+        /// A row of [`Emitters::mesh_lights`].
+        mesh_light: u32,
+    },
     /// A light that is not a mesh: a row of [`Scene::lights`].
     Light(u32),
 }
@@ -31,30 +49,52 @@ pub struct LightEntry {
     pub path: String,
     /// Where it comes from.
     pub source: LightSource,
-    /// Whether its bounds change with time: its node moves, or its strength varies.
+    /// Whether its node moves with time.
     pub moves: bool,
     /// Whether its strength varies with time.
     pub varies: bool,
+    /// Whether it is left out of all estimates and sampled at every point.
+    pub forced: bool,
+    /// Whether a tree in the space of its own mesh serves it, shared with other instances or carried
+    /// along: its node's transform keeps shapes at every time.
+    pub in_own_space: bool,
     /// Number of its first emitter.
     pub first: u32,
     /// How many emitters it has.
     pub count: u32,
-    /// For a mesh light of which not every triangle emits: those that do, ascending.
-    triangles: Option<Vec<u32>>,
-    /// For textured emission, the mean of the texture over each emitter (nits are a factor).
-    texture_means: Option<Vec<Rgb>>,
 }
+
+impl LightEntry {
+    /// Whether anything of its bounds changes with time.
+    pub fn changes(&self) -> bool {
+        self.moves || self.varies
+    }
+
+    /// What decides the order of lights, before their paths: the forced come last, before them what
+    /// changes; and of each those that trees of their own serve.
+    fn class(&self) -> (bool, bool, bool) {
+        (self.forced, self.changes(), self.in_own_space || self.forced)
+    }
+}
+
+/// From so many triangles on a mesh light that is instanced or carried along has a tree of its own:
+/// fewer do not fill a group of eight.
+const LEAST_TO_SHARE: u32 = 8;
+/// Emitters looked up together.
+const BLOCK: u32 = 64;
 
 /// All emitters of a scene that the tree is built over. Suns and domes are not among them; see
 /// [`infinite_lights`](super::infinite_lights).
 ///
-/// Emitters are numbered light by light: first the lights that stand still, then those that move
-/// or vary, each in order of path; within a light in order of triangle. The numbers depend on the scene
-/// alone, not on the order of its tables.
+/// Emitters are numbered light by light, in the order of the lights' classes and then of their paths;
+/// within a light in order of triangle. The numbers depend on the scene alone, not on the order of
+/// its tables. A mesh light that is instanced a thousand times is stored once.
 pub struct Emitters {
     lights: Vec<LightEntry>,
-    refs: Vec<EmitterRef>,
-    static_count: usize,
+    mesh_lights: Vec<MeshLight>,
+    count: u32,
+    /// For every [`BLOCK`] emitters the light of the first.
+    blocks: Vec<u32>,
     /// For each instance of the scene its light, if it is one.
     light_of_instance: Vec<Option<u32>>,
     /// For each light of the scene its entry, if it has one.
@@ -65,74 +105,46 @@ impl Emitters {
     /// Finds all emitters of a scene, by the most that each light ever gives. Triangles without
     /// area and triangles whose texels are all black are none.
     pub fn collect(scene: &Scene) -> Emitters {
+        let (mesh_lights, of_instance) = mesh_light::find(scene);
+        let mut lights = mesh_entries(scene, &mesh_lights, &of_instance);
         let moving = scene.moving_nodes();
-        let whole_means: Vec<OnceLock<Rgb>> =
-            scene.textures.iter().map(|_| OnceLock::new()).collect();
-        let mesh_light = |(i, instance): (usize, &crate::scene::Instance)| {
-            let mesh = &scene.meshes[instance.mesh as usize];
-            let material = scene.material_of(instance.mesh)?;
-            let peak = scene.peak_rgb_of_instance(i as u32);
-            if peak.max_element() <= 0.0 {
-                return None;
+        for (i, light) in scene.lights.iter().enumerate() {
+            if shines(&light.kind, scene.peak_rgb_of_light(i as u32)) {
+                lights.push(LightEntry {
+                    path: scene.light_path(i).to_owned(),
+                    source: LightSource::Light(i as u32),
+                    moves: moving[light.node as usize],
+                    varies: light.values.is_some(),
+                    forced: light.forced,
+                    in_own_space: false,
+                    first: 0,
+                    count: 1,
+                });
             }
-            let found = emitting_triangles(scene, mesh, material, peak, &whole_means);
-            let varies = instance.values.is_some();
-            (found.count > 0).then(|| LightEntry {
-                path: instance.path.clone(),
-                source: LightSource::Instance(i as u32),
-                moves: moving[instance.node as usize] || varies,
-                varies,
-                first: 0,
-                count: found.count,
-                triangles: found.triangles,
-                texture_means: found.texture_means,
-            })
-        };
-        let mut lights: Vec<LightEntry> =
-            scene.instances.par_iter().enumerate().filter_map(mesh_light).collect();
-        let other = scene
-            .lights
-            .iter()
-            .enumerate()
-            .filter(|(i, light)| shines(&light.kind, scene.peak_rgb_of_light(*i as u32)));
-        lights.extend(other.map(|(i, light)| LightEntry {
-            path: scene.light_path(i).to_owned(),
-            source: LightSource::Light(i as u32),
-            moves: moving[light.node as usize] || light.values.is_some(),
-            varies: light.values.is_some(),
-            first: 0,
-            count: 1,
-            triangles: None,
-            texture_means: None,
-        }));
-        lights.sort_by(|a, b| (a.moves, &a.path).cmp(&(b.moves, &b.path)));
-        Emitters::number(scene, lights)
+        }
+        lights.sort_by(|a, b| a.class().cmp(&b.class()).then_with(|| a.path.cmp(&b.path)));
+        Emitters::number(scene, lights, mesh_lights)
     }
 
     /// Numbers the emitters of sorted lights.
-    fn number(scene: &Scene, mut lights: Vec<LightEntry>) -> Emitters {
-        let mut refs = Vec::new();
-        let mut static_count = 0;
+    fn number(scene: &Scene, mut lights: Vec<LightEntry>, mesh_lights: Vec<MeshLight>) -> Emitters {
         let mut light_of_instance = vec![None; scene.instances.len()];
         let mut entry_of_light = vec![None; scene.lights.len()];
-        for (row, entry) in lights.iter_mut().enumerate() {
-            let light = row as u32;
-            entry.first = refs.len() as u32;
-            match &entry.triangles {
-                Some(list) => refs.extend(list.iter().map(|&t| EmitterRef { light, triangle: t })),
-                None => refs.extend((0..entry.count).map(|t| EmitterRef { light, triangle: t })),
-            }
-            if !entry.moves {
-                static_count = refs.len();
+        let (mut count, mut blocks) = (0u32, Vec::new());
+        for (row, entry) in (0..).zip(&mut lights) {
+            entry.first = count;
+            count += entry.count;
+            while (blocks.len() as u32) < count.div_ceil(BLOCK) {
+                blocks.push(row);
             }
             match entry.source {
-                LightSource::Instance(instance) => {
-                    light_of_instance[instance as usize] = Some(light)
+                LightSource::Mesh { instance, .. } => {
+                    light_of_instance[instance as usize] = Some(row)
                 }
-                LightSource::Light(light_row) => entry_of_light[light_row as usize] = Some(light),
+                LightSource::Light(light) => entry_of_light[light as usize] = Some(row),
             }
         }
-        Emitters { lights, refs, static_count, light_of_instance, entry_of_light }
+        Emitters { lights, mesh_lights, count, blocks, light_of_instance, entry_of_light }
     }
 
     /// The lights, in the order of their emitters.
@@ -140,25 +152,50 @@ impl Emitters {
         &self.lights
     }
 
+    /// What the mesh lights are instances of.
+    pub fn mesh_lights(&self) -> &[MeshLight] {
+        &self.mesh_lights
+    }
+
     /// How many emitters there are.
     pub fn len(&self) -> usize {
-        self.refs.len()
+        self.count as usize
     }
 
     /// Whether there is none.
     pub fn is_empty(&self) -> bool {
-        self.refs.is_empty()
+        self.count == 0
     }
 
-    /// How many emitters neither move nor vary: they come first.
-    pub fn static_count(&self) -> usize {
-        self.static_count
+    /// How many emitters belong to lights that change with time.
+    pub fn changing_count(&self) -> usize {
+        let changing = self.lights.iter().filter(|light| light.changes());
+        changing.map(|light| light.count as usize).sum()
     }
 
     /// What an emitter is.
     #[inline]
     pub fn get(&self, emitter: u32) -> EmitterRef {
-        self.refs[emitter as usize]
+        let block = (emitter / BLOCK) as usize;
+        let (from, to) = (self.blocks[block], self.blocks.get(block + 1));
+        let to = to.map_or(self.lights.len(), |&to| to as usize + 1);
+        let candidates = &self.lights[from as usize..to];
+        let after = candidates.partition_point(|light| light.first <= emitter);
+        let light = from + after as u32 - 1;
+        EmitterRef { light, own: emitter - self.lights[light as usize].first }
+    }
+
+    /// Where an emitter is in the scene.
+    #[inline]
+    pub fn place_of(&self, emitter: u32) -> EmitterPlace {
+        let EmitterRef { light, own } = self.get(emitter);
+        match self.lights[light as usize].source {
+            LightSource::Mesh { instance, mesh_light } => {
+                let triangle = self.mesh_lights[mesh_light as usize].triangle(own);
+                EmitterPlace::Triangle { instance, triangle }
+            }
+            LightSource::Light(row) => EmitterPlace::Light(row),
+        }
     }
 
     /// The light of an emitter.
@@ -171,11 +208,8 @@ impl Emitters {
     #[inline]
     pub fn of_triangle(&self, instance: u32, triangle: u32) -> Option<u32> {
         let entry = &self.lights[self.light_of_instance[instance as usize]? as usize];
-        let at = match &entry.triangles {
-            Some(list) => list.binary_search(&triangle).ok()? as u32,
-            None => triangle,
-        };
-        Some(entry.first + at)
+        let LightSource::Mesh { mesh_light, .. } = entry.source else { return None };
+        Some(entry.first + self.mesh_lights[mesh_light as usize].of_triangle(triangle)?)
     }
 
     /// The emitter that a light of the scene is, if it is one.
@@ -183,65 +217,46 @@ impl Emitters {
     pub fn of_light(&self, light: u32) -> Option<u32> {
         Some(self.lights[self.entry_of_light[light as usize]? as usize].first)
     }
-
-    /// The mean of the emission texture over an emitter; white without a texture.
-    pub(super) fn texture_mean(&self, emitter: u32) -> Rgb {
-        let entry = self.light_of(emitter);
-        let means = entry.texture_means.as_ref();
-        means.map_or(Rgb::ONE, |means| means[(emitter - entry.first) as usize])
-    }
 }
 
-/// Whether a light that is not a mesh is an emitter.
-fn shines(kind: &LightKind, peak: Rgb) -> bool {
-    match kind {
-        LightKind::Point { .. } | LightKind::Spot { .. } => luminance(peak) > 0.0,
-        LightKind::Sphere { radius, .. } => luminance(peak) > 0.0 && *radius > 0.0,
-        LightKind::Distant { .. } | LightKind::Dome { .. } => false,
-    }
-}
-
-/// The triangles of a mesh that emit.
-struct Emitting {
-    count: u32,
-    triangles: Option<Vec<u32>>,
-    texture_means: Option<Vec<Rgb>>,
-}
-
-fn emitting_triangles(
+/// The instances that are lights.
+fn mesh_entries(
     scene: &Scene,
-    mesh: &Mesh,
-    material: &Material,
-    peak_nits: Rgb,
-    whole_means: &[OnceLock<Rgb>],
-) -> Emitting {
-    let textured = material
-        .emission_texture
-        .filter(|usage| mesh.uv_sets.get(usage.uv_set as usize).is_some_and(|set| !set.is_empty()));
-    let means = textured.map(|usage| {
-        let uvs = &mesh.uv_sets[usage.uv_set as usize];
-        let on_texture = |triangle: &[u32; 3]| triangle.map(|corner| uvs[corner as usize]);
-        let (texture, whole) =
-            (&scene.textures[usage.texture as usize], &whole_means[usage.texture as usize]);
-        let all = mesh.triangles.iter().map(on_texture);
-        (TexelMeans::new(texture, usage, all, whole), on_texture)
-    });
-    let mean_of = |triangle: &[u32; 3]| match &means {
-        None => Rgb::ONE,
-        Some((means, on_texture)) => means.over(on_texture(triangle)),
+    mesh_lights: &[MeshLight],
+    of_instance: &[Option<u32>],
+) -> Vec<LightEntry> {
+    let (moving, rigid) = (scene.moving_nodes(), scene.rigid_nodes());
+    let still = scene.pose_at(0.0);
+    let keeps_shapes =
+        |node: u32| rigid[node as usize] && Similarity::undoing(&still.world(node)).is_some();
+    let mut users = vec![0u32; mesh_lights.len()];
+    of_instance.iter().flatten().for_each(|&row| users[row as usize] += 1);
+    let rows = scene.instances.iter().zip(of_instance).enumerate();
+    let entry = |(i, (instance, row)): (usize, (&crate::scene::Instance, &Option<u32>))| {
+        let mesh_light = (*row)?;
+        let count = mesh_lights[mesh_light as usize].count;
+        let (moves, varies) = (moving[instance.node as usize], instance.values.is_some());
+        let is_shared = users[mesh_light as usize] > 1 || moves || varies;
+        Some(LightEntry {
+            path: instance.path.clone(),
+            source: LightSource::Mesh { instance: i as u32, mesh_light },
+            moves,
+            varies,
+            forced: instance.forced,
+            in_own_space: is_shared && count >= LEAST_TO_SHARE && keeps_shapes(instance.node),
+            first: 0,
+            count,
+        })
     };
-    let emission = |(triangle, corners): (usize, &[u32; 3])| {
-        let [a, b, c] = corners.map(|corner| mesh.positions[corner as usize].as_dvec3());
-        let has_area = (b - a).cross(c - a).length_squared() > 0.0;
-        let mean = if has_area { mean_of(corners) } else { Rgb::ZERO };
-        (luminance(mean * peak_nits) > 0.0).then_some((triangle as u32, mean))
-    };
-    let found: Vec<(u32, Rgb)> =
-        mesh.triangles.par_iter().enumerate().filter_map(emission).collect();
-    let all = found.len() == mesh.triangles.len();
-    Emitting {
-        count: found.len() as u32,
-        triangles: (!all).then(|| found.iter().map(|&(triangle, _)| triangle).collect()),
-        texture_means: textured.map(|_| found.iter().map(|&(_, mean)| mean).collect()),
+    rows.filter_map(entry).collect()
+}
+
+/// Whether a light that is not a mesh is an emitter, given the most that it ever gives.
+fn shines(kind: &LightKind, peak: Rgb) -> bool {
+    let shines = luminance(peak) > 0.0;
+    match kind {
+        LightKind::Point { .. } | LightKind::Spot { .. } => shines,
+        LightKind::Sphere { radius, .. } => shines && *radius > 0.0,
+        LightKind::Distant { .. } | LightKind::Dome { .. } => false,
     }
 }

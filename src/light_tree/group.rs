@@ -5,8 +5,9 @@
 //! intermediate cluster blurs it; and a smaller file, because the intermediate clusters are gone.
 //! Fields are kept apart, lane by lane, as vector instructions want them.
 
-use super::importance::{Cluster, Receiver, factors, importance};
+use super::importance::{Cluster, Factors, importance};
 use super::node::{self, Link, Node};
+use super::viewer::Viewer;
 use bytemuck::{Pod, Zeroable};
 use std::array::from_fn;
 
@@ -25,7 +26,7 @@ pub struct Group {
     axis: [[i16; WIDTH]; 2],
     theta_o: [u16; WIDTH],
     theta_e: [u8; WIDTH],
-    reserved: [u8; WIDTH],
+    range: [u8; WIDTH],
     link: [u32; WIDTH],
 }
 
@@ -37,6 +38,7 @@ pub(super) struct Lanes {
     sin_half_theta_o: [f32; WIDTH],
     cos_theta_e: [f32; WIDTH],
     two_sided: [bool; WIDTH],
+    inverse_range2: [f32; WIDTH],
 }
 
 impl Group {
@@ -54,7 +56,7 @@ impl Group {
             axis: self.axis.map(|part| part[lane]),
             theta_o: self.theta_o[lane],
             theta_e: self.theta_e[lane],
-            reserved: self.reserved[lane],
+            range: self.range[lane],
             link: self.link[lane],
         }
     }
@@ -62,6 +64,12 @@ impl Group {
     /// The nodes of the lanes that are used.
     pub fn nodes(&self) -> impl Iterator<Item = Node> + '_ {
         (0..WIDTH).filter_map(|lane| self.node(lane))
+    }
+
+    /// A lane, decoded for the importance.
+    #[inline]
+    pub(super) fn cluster(&self, lane: usize) -> Cluster {
+        self.lane(lane).cluster()
     }
 
     /// Fills a lane.
@@ -76,8 +84,12 @@ impl Group {
         self.axis[1][lane] = node.axis[1];
         self.theta_o[lane] = node.theta_o;
         self.theta_e[lane] = node.theta_e;
-        self.reserved[lane] = node.reserved;
+        self.range[lane] = node.range;
         self.link[lane] = node.link;
+    }
+
+    pub(super) fn set_energy(&mut self, lane: usize, energy: f32) {
+        self.energy[lane] = energy;
     }
 
     /// Where a lane leads.
@@ -111,25 +123,35 @@ impl Group {
             sin_half_theta_o: self.theta_o.map(node::decode_sin_half_theta_o),
             cos_theta_e: self.theta_e.map(node::decode_cos_theta_e),
             two_sided: self.theta_o.map(node::is_two_sided),
+            inverse_range2: if self.range == [0; WIDTH] {
+                [0.0; WIDTH]
+            } else {
+                self.range.map(node::decode_inverse_range2)
+            },
         }
     }
 }
 
 impl Group {
-    /// The importance of each lane; 0 for a lane that is not used.
+    /// The importance of each lane to a viewer; 0 for a lane that is not used.
     #[inline]
-    pub fn importances(&self, receiver: &Receiver) -> [f64; WIDTH] {
-        let mut products = [0.0; WIDTH];
-        let mut distances2 = [0.0; WIDTH];
+    pub fn importances(&self, viewer: &impl Viewer) -> [f64; WIDTH] {
+        self.weigh(viewer).0
+    }
+
+    /// The importance of each lane to a viewer, and how uncertain each is.
+    #[inline]
+    pub(super) fn weigh(&self, viewer: &impl Viewer) -> ([f64; WIDTH], [f32; WIDTH]) {
         let lanes = self.decode();
-        for lane in 0..WIDTH {
-            (products[lane], distances2[lane]) = factors(&lanes.cluster(lane), receiver);
+        let mut factors = [Factors { product: 0.0, decay: 0.0, spread: 0.0 }; WIDTH];
+        for (lane, factors) in factors.iter_mut().enumerate() {
+            *factors = viewer.factors(&lanes.cluster(lane));
         }
         let mut weights = [0.0; WIDTH];
         for lane in 0..WIDTH {
-            weights[lane] = importance(self.energy(lane), products[lane], distances2[lane]);
+            weights[lane] = importance(self.energy(lane), &factors[lane]);
         }
-        weights
+        (weights, factors.map(|factors| factors.spread))
     }
 }
 
@@ -144,6 +166,7 @@ impl Lanes {
             sin_half_theta_o: self.sin_half_theta_o[lane],
             cos_theta_e: self.cos_theta_e[lane],
             two_sided: self.two_sided[lane],
+            inverse_range2: self.inverse_range2[lane],
         }
     }
 }

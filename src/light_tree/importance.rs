@@ -9,34 +9,32 @@
 //! - Importance 0 is a proof of darkness, so it is granted only beyond a [slack](EDGE_SLACK) that covers
 //!   all rounding; whatever else is small stays above a [floor](FLOOR).
 //!
+//! Lights with a range are dark beyond it: so is a cluster whose box is wholly out of reach of the
+//! longest range in it. Inside, the estimate takes glTF's window `1 - (d / range)^4`
+//! (`KHR_lights_punctual`) at the nearest point of the box.
+//!
 //! The formula is written once, for one lane, without a branch, so that the compiler computes the
 //! eight lanes of a group together.
 
+use super::viewer::Receiver;
 use glam::Vec3;
-
-/// Where light is wanted: the one description that sampling and its probability share.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Receiver {
-    /// World space, metres.
-    pub point: Vec3,
-    /// Unit shading normal on the side that is lit, world space; zero if light from every
-    /// direction counts (a point in a medium).
-    pub normal: Vec3,
-}
 
 /// A box this share of its distance above the horizon is not yet called below it: many times the
 /// rounding of the sums.
 const HORIZON_SLACK: f32 = 1e-5;
 /// A cosine this much beyond the cone's edge is not yet called dark. Sines taken from cosines near 1
 /// are off by up to 3.5e-4; the worst that a search along the edge found is 7.4e-4.
-const EDGE_SLACK: f32 = 2e-3;
+pub(super) const EDGE_SLACK: f32 = 2e-3;
 /// The least value of a cosine factor that is not provably zero.
-const FLOOR: f32 = 1e-4;
+pub(super) const FLOOR: f32 = 1e-4;
 /// The share of the sphere's squared radius that softens the squared distance.
-const SOFTENING: f32 = 0.1;
+pub(super) const SOFTENING: f32 = 0.1;
+/// Squares of distances and ranges are exact to so many parts.
+const RANGE_SLACK: f32 = 1e-5;
 
 /// What the formula needs of a cluster, decoded. Components apart, as lanes have them.
-pub(super) struct Cluster {
+#[derive(Clone, Copy, Debug)]
+pub struct Cluster {
     pub center: [f32; 3],
     pub half_extent: [f32; 3],
     /// Not of unit length.
@@ -44,12 +42,72 @@ pub(super) struct Cluster {
     pub sin_half_theta_o: f32,
     pub cos_theta_e: f32,
     pub two_sided: bool,
+    /// 1/m^2 of the longest range in it; 0 if any is without end.
+    pub inverse_range2: f32,
 }
 
-/// The product of both cosine factors, and the squared distance, m^2. Importance is energy times
-/// the first over the second.
+/// A cluster as a viewer sees it: the radius of its sphere and the distance to its centre.
+#[derive(Clone, Copy, Debug)]
+pub struct View {
+    pub radius: f64,
+    pub distance: f64,
+}
+
+impl View {
+    /// Of the sphere, sr; a hemisphere from inside.
+    pub fn solid_angle(&self) -> f64 {
+        let (r2, d2) = (self.radius * self.radius, self.distance * self.distance);
+        let cos_u = if r2 > 0.0 { (1.0 - r2 / d2.max(r2)).sqrt() } else { 1.0 };
+        std::f64::consts::TAU * (1.0 - cos_u)
+    }
+}
+
+impl Cluster {
+    /// Its sphere as seen from a point.
+    pub fn view_from(&self, p: Vec3) -> View {
+        let [center, half] =
+            [self.center, self.half_extent].map(|v| Vec3::from_array(v).as_dvec3());
+        View { radius: half.length(), distance: (center - p.as_dvec3()).length() }
+    }
+
+    /// The share of light that is left at a squared distance, m^2; 0 only surely out of range.
+    #[inline(always)]
+    pub fn window(&self, nearest2: f32) -> f32 {
+        let ratio2 = nearest2 * self.inverse_range2;
+        let window = (1.0 - ratio2 * ratio2).max(FLOOR);
+        if ratio2 > 1.0 + RANGE_SLACK { 0.0 } else { window }
+    }
+}
+
+/// What an importance is made of.
+#[derive(Clone, Copy, Debug)]
+pub struct Factors {
+    /// The cosines, and all else that has no unit. 0 only where provably no light arrives.
+    pub product: f32,
+    /// What the importance falls with: the squared distance, m^2; along a segment the distance, m.
+    pub decay: f32,
+    /// How uncertain it is: the squared relative deviation of what the cluster's emitters send.
+    pub spread: f32,
+}
+
+/// Squared distances to the sphere's surface are not taken below this share of its squared radius:
+/// within, a cluster is as uncertain as it can be, but finitely so.
+const CLOSEST: f32 = 0.05;
+
+/// The squared relative deviation of `1/d^2` for distances spread over a sphere of squared radius
+/// `r2` at a squared distance `d2`: `(4/3) R^2 / (d^2 - R^2)`, which is HPG 2018's equations 8 and 9
+/// without their cancellation. And of emission, for narrow beams spread over a wide cone: so many
+/// more than reach a receiver at once do not. (Faces reach half of all receivers, points every one.)
 #[inline(always)]
-pub(super) fn factors(cluster: &Cluster, receiver: &Receiver) -> (f32, f32) {
+pub(super) fn spread(r2: f32, d2: f32, cos_o: f32, cos_e: f32) -> f32 {
+    let of_distance = 4.0 / 3.0 * r2 / (d2 - r2).max(CLOSEST * r2).max(f32::MIN_POSITIVE);
+    let of_direction = ((1.0 - cos_o) / (1.0 - cos_e).max(1e-9) - 2.0).max(0.0);
+    of_distance + of_direction
+}
+
+/// Importance is energy times the product over the decay.
+#[inline(always)]
+pub(super) fn factors(cluster: &Cluster, receiver: &Receiver) -> Factors {
     let [px, py, pz] = receiver.point.to_array();
     let [nx, ny, nz] = receiver.normal.to_array();
     let [cx, cy, cz] = cluster.center;
@@ -98,15 +156,24 @@ pub(super) fn factors(cluster: &Cluster, receiver: &Receiver) -> (f32, f32) {
     let best = if cosine_i >= cos_u { 1.0 } else { cosine_i * cos_u + sine_i * sin_u };
     let reception = if inside | in_medium { 1.0 } else { best.max(FLOOR) };
 
-    let product = emission * reception;
-    (if is_below | is_dark { 0.0 } else { product }, distance2)
+    // Range: at the point of the box that is nearest.
+    let [ox, oy, oz] =
+        [(vx.abs() - hx).max(0.0), (vy.abs() - hy).max(0.0), (vz.abs() - hz).max(0.0)];
+    let window = cluster.window(ox * ox + oy * oy + oz * oz);
+
+    let product = emission * reception * window;
+    Factors {
+        product: if is_below | is_dark { 0.0 } else { product },
+        decay: distance2,
+        spread: spread(r2, d2, cos_o, cluster.cos_theta_e),
+    }
 }
 
 /// Energy times cosines over squared distance, in double precision: energies and distances may
 /// span more than `f32` does.
 #[inline(always)]
-pub(super) fn importance(energy: f32, product: f32, distance2: f32) -> f64 {
+pub(super) fn importance(energy: f32, factors: &Factors) -> f64 {
     /// Below every distance that `f32` squares, above nothing at all.
     const LEAST: f64 = 1e-60;
-    f64::from(energy) * f64::from(product) / (f64::from(distance2) + LEAST)
+    f64::from(energy) * f64::from(factors.product) / (f64::from(factors.decay) + LEAST)
 }

@@ -11,27 +11,45 @@
 //! |---|---|
 //! | `node` | 32 bytes: bounds rounded outwards, and a link |
 //! | `group` | the eight children of a cluster, lane by lane |
-//! | `importance` | what a cluster may send to a [`Receiver`] |
+//! | `viewer` | who asks: a [`Receiver`], or a stretch of a ray ([`Segment`]) |
+//! | `importance`, `segment` | what a cluster may send to each |
 //! | `builder` | the partition (SAOH) and the bounds, deterministic and parallel |
 //! | `writer`, `records`, `tree` | the trees of a shot as a file, and that file opened |
-//! | `sampling` | picking an emitter, and the probability of the pick |
+//! | `sampling` | picking an emitter |
+//! | `splitting`, `cut` | how many samples a viewer is worth; the clusters they are taken from |
+//! | `picks` | picking those, and how often each light is expected to be |
+//! | `leaves`, `probability` | the way back from an emitter to its probability |
+//! | `variance` | how far off an estimate is, in closed form |
 //! | `verify` | proof that a file keeps the format's promises |
 
 mod builder;
+mod cut;
 mod group;
 mod importance;
+mod leaves;
 mod node;
+mod picks;
+mod probability;
 mod records;
 mod sampling;
+mod segment;
+mod splitting;
 mod tree;
+mod variance;
 mod verify;
+mod viewer;
 mod writer;
 
 pub use builder::ALGORITHM_VERSION;
+pub use cut::{Picked, Scratch};
 pub use group::{Group, WIDTH};
-pub use importance::Receiver;
+pub use leaves::LeafTable;
 pub use node::{Link, Node};
-pub use records::{FrameRow, LightRow, Parent, TreeRow};
-pub use sampling::{FrameTree, LeafTable, Pick};
+pub use records::{FrameRow, InstanceRow, LightRow, TreeKind, TreeRow};
+pub use sampling::{FrameTree, Pick};
+pub use segment::Segment;
+pub use splitting::{SplitTest, Splitting};
 pub use tree::{LightTree, NoSuchFrame};
+pub use variance::Moments;
+pub use viewer::{DistanceOnly, Glossy, Receiver, Viewer};
 pub use writer::{LightSummary, LightTreeWriter};

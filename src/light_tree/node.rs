@@ -4,11 +4,13 @@
 //! a kilometre light fit one scene. Everything that decides "no light from here" is rounded to the
 //! safe side: boxes and cones only ever grow. The layout is in the [format](crate::store).
 
-use super::importance::{Cluster, Receiver, factors, importance};
+use super::importance::{Cluster, importance};
+use super::viewer::Viewer;
 use crate::bounds::{Aabb, Cone, LightBounds};
 use crate::math::angle::between;
 use bytemuck::{Pod, Zeroable};
 use glam::{DVec3, Vec2, Vec3};
+use std::sync::LazyLock;
 
 /// One emitter or one cluster, on its own; a [group](super::group::Group) holds eight.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
@@ -21,12 +23,12 @@ pub struct Node {
     pub(super) axis: [i16; 2],
     pub(super) theta_o: u16,
     pub(super) theta_e: u8,
-    pub(super) reserved: u8,
+    pub(super) range: u8,
     pub(super) link: u32,
 }
 
 /// Where a node leads.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Link {
     /// Nowhere: the lane is not used.
     Nothing,
@@ -34,23 +36,23 @@ pub enum Link {
     Inner(u32),
     /// It is an emitter, by number.
     Emitter(u32),
-    /// It stands for a whole tree, by row.
-    Tree(u32),
+    /// It stands for a whole tree that is put somewhere: by row of the instances.
+    Instance(u32),
 }
 
 const LEAF_BIT: u32 = 1 << 31;
-const TREE_BIT: u32 = 1 << 30;
-/// Emitters, trees and groups are numbered below this.
+const INSTANCE_BIT: u32 = 1 << 30;
+/// Emitters, instances and groups are numbered below this.
 pub(super) const MOST: usize = 1 << 30;
 
 impl Link {
     #[inline]
     pub(super) fn decode(code: u32) -> Link {
-        match (code & LEAF_BIT, code & TREE_BIT) {
+        match (code & LEAF_BIT, code & INSTANCE_BIT) {
             (0, _) if code == 0 => Link::Nothing,
             (0, _) => Link::Inner(code),
             (_, 0) => Link::Emitter(code & !LEAF_BIT),
-            _ => Link::Tree(code & !(LEAF_BIT | TREE_BIT)),
+            _ => Link::Instance(code & !(LEAF_BIT | INSTANCE_BIT)),
         }
     }
 
@@ -59,7 +61,7 @@ impl Link {
             Link::Nothing => 0,
             Link::Inner(ahead) => ahead,
             Link::Emitter(emitter) => emitter | LEAF_BIT,
-            Link::Tree(row) => row | LEAF_BIT | TREE_BIT,
+            Link::Instance(row) => row | LEAF_BIT | INSTANCE_BIT,
         }
     }
 }
@@ -93,7 +95,7 @@ impl Node {
             axis,
             theta_o: theta_o.min(32767.0) as u16 | two_sided,
             theta_e: theta_e.min(255.0) as u8,
-            reserved: 0,
+            range: encode_range(bounds.range_m),
             link: link.encode(),
         }
     }
@@ -113,6 +115,7 @@ impl Node {
                 two_sided: is_two_sided(self.theta_o),
             },
             energy: self.energy,
+            range_m: decode_range(self.range),
         }
     }
 
@@ -140,6 +143,10 @@ impl Node {
         self.energy
     }
 
+    pub(super) fn with_energy(self, energy: f32) -> Node {
+        Node { energy, ..self }
+    }
+
     /// Decoded for the importance.
     pub(super) fn cluster(&self) -> Cluster {
         Cluster {
@@ -149,6 +156,7 @@ impl Node {
             sin_half_theta_o: decode_sin_half_theta_o(self.theta_o),
             cos_theta_e: decode_cos_theta_e(self.theta_e),
             two_sided: is_two_sided(self.theta_o),
+            inverse_range2: decode_inverse_range2(self.range),
         }
     }
 
@@ -160,8 +168,6 @@ impl Node {
             Some("its energy is not a positive number")
         } else if self.axis.contains(&i16::MIN) {
             Some("its axis is out of range")
-        } else if self.reserved != 0 {
-            Some("its reserved byte is not zero")
         } else {
             None
         }
@@ -169,11 +175,10 @@ impl Node {
 }
 
 impl Node {
-    /// Importance of this cluster to a receiver: an estimate of the irradiance from it, in the
-    /// scene's units; 0 only where none of its light can arrive.
-    pub fn importance(&self, receiver: &Receiver) -> f64 {
-        let (product, distance2) = factors(&self.cluster(), receiver);
-        importance(self.energy(), product, distance2)
+    /// Importance of this cluster to a viewer: an estimate of the irradiance from it, in the scene's
+    /// units; 0 only where none of its light can arrive.
+    pub fn importance(&self, viewer: &impl Viewer) -> f64 {
+        importance(self.energy(), &viewer.factors(&self.cluster()))
     }
 }
 
@@ -192,6 +197,9 @@ impl Node {
             || (is_two_sided(child.theta_o) && !is_two_sided(self.theta_o))
         {
             return Some("a child shines where its parent does not");
+        }
+        if self.range != 0 && !(1..=self.range).contains(&child.range) {
+            return Some("a child reaches farther than its parent");
         }
         let code = |node: &Node| node.theta_o & !TWO_SIDED_BIT;
         let everywhere = code(self) == !TWO_SIDED_BIT;
@@ -243,7 +251,11 @@ fn encode_axis(axis: Vec3) -> [i16; 2] {
     if flat.z < 0.0 {
         folded = (Vec2::ONE - Vec2::new(flat.y, flat.x).abs()) * sign(flat.truncate());
     }
-    (folded * AXIS_STEPS).round().to_array().map(|step| step as i16)
+    let [x, y] = (folded * AXIS_STEPS).round().to_array();
+    // On the rim of the square two codes stand for one direction: take the positive one.
+    let x = if y.abs() == AXIS_STEPS { x.abs() } else { x };
+    let y = if x.abs() == AXIS_STEPS { y.abs() } else { y };
+    [x as i16, y as i16]
 }
 
 /// The direction of an octahedral code, not of unit length.
@@ -270,6 +282,40 @@ pub(super) fn decode_sin_half_theta_o(code: u16) -> f32 {
 pub(super) fn decode_cos_theta_e(code: u8) -> f32 {
     let root = f32::from(code) * (1.0 / THETA_E_STEPS as f32);
     1.0 - root * root
+}
+
+/// Steps of a range in an octave.
+const RANGE_STEPS: f32 = 4.0;
+/// Base-2 logarithm of the range, in metres, of code 1.
+const SHORTEST_RANGE: f32 = -31.75;
+
+/// The smallest code whose range is at least this; 0 for a range without end, or beyond the largest
+/// code (3.6e9 m).
+fn encode_range(range_m: f32) -> u8 {
+    let estimate = ((range_m.log2() - SHORTEST_RANGE) * RANGE_STEPS).floor().clamp(0.0, 255.0);
+    let mut code = (estimate as u8).max(1);
+    while decode_range(code) < range_m && code != 0 {
+        code = code.wrapping_add(1);
+    }
+    code
+}
+
+/// Metres.
+fn decode_range(code: u8) -> f32 {
+    match code {
+        0 => f32::INFINITY,
+        _ => ((f32::from(code) - 1.0) / RANGE_STEPS + SHORTEST_RANGE).exp2(),
+    }
+}
+
+/// 1/m^2, by code.
+static INVERSE_RANGE2: LazyLock<[f32; 256]> =
+    LazyLock::new(|| std::array::from_fn(|code| decode_range(code as u8).powi(-2)));
+
+#[inline(always)]
+pub(super) fn decode_inverse_range2(code: u8) -> f32 {
+    // Most scenes have no ranges, and their nodes no table.
+    if code == 0 { 0.0 } else { INVERSE_RANGE2[code as usize] }
 }
 
 #[inline(always)]
@@ -307,10 +353,12 @@ mod tests {
         let cone = (axis, theta_o, theta_e, any::<bool>()).prop_map(
             |(axis, theta_o, theta_e, two_sided)| Cone { axis, theta_o, theta_e, two_sided },
         );
-        (point, scale.clone(), extent, scale, cone, 1e-30f32..1e30).prop_map(
-            |(p, far, extent, size, cone, energy)| {
+        let range = prop_oneof![Just(f32::INFINITY), 1e-6f32..1e6];
+        (point, scale.clone(), extent, scale, cone, 1e-30f32..1e30, range).prop_map(
+            |(p, far, extent, size, cone, energy, range_m)| {
                 let min = p * far;
-                LightBounds { aabb: Aabb { min, max: min + extent * size }, cone, energy }
+                let aabb = Aabb { min, max: min + extent * size };
+                LightBounds { aabb, cone, energy, range_m }
             },
         )
     }
@@ -325,6 +373,9 @@ mod tests {
             prop_assert!(decoded.cone.theta_o >= needed - 2e-6);
             prop_assert!(decoded.cone.theta_e >= bounds.cone.theta_e - 1e-6);
             prop_assert_eq!(decoded.energy, bounds.energy);
+            prop_assert!(decoded.range_m >= bounds.range_m);
+            let close = decoded.range_m <= bounds.range_m * 1.2;
+            prop_assert!(close || !(1e-9..1e9).contains(&bounds.range_m));
         }
 
         #[test]
@@ -334,6 +385,7 @@ mod tests {
             prop_assert_eq!(once.axis, twice.axis);
             prop_assert_eq!(once.theta_o, twice.theta_o);
             prop_assert_eq!(once.theta_e, twice.theta_e);
+            prop_assert_eq!(once.range, twice.range);
         }
     }
 
@@ -343,6 +395,7 @@ mod tests {
             aabb: Aabb { min: Vec3::splat(1e7), max: Vec3::splat(1e7) },
             cone: Cone::flat(Vec3::Y, true),
             energy: 2.0,
+            range_m: f32::INFINITY,
         };
         assert_eq!(Node::encode(&bounds, Link::Emitter(0)).bounds(), bounds);
         let all = LightBounds { cone: Cone::ALL, ..bounds };
@@ -357,7 +410,7 @@ mod tests {
 
     #[test]
     fn links_survive() {
-        for link in [Link::Nothing, Link::Inner(7), Link::Emitter(0), Link::Tree(0)] {
+        for link in [Link::Nothing, Link::Inner(7), Link::Emitter(0), Link::Instance(0)] {
             assert_eq!(Link::decode(link.encode()), link);
         }
     }

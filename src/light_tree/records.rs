@@ -1,17 +1,19 @@
 //! The rows of a tree file. Their layout is in the [format](crate::store).
 
 use super::node::Node;
+use crate::math::Similarity;
 use crate::store::SectionId;
 use bytemuck::{Pod, Zeroable};
 
 pub const META: SectionId = SectionId(*b"META");
 pub const TREES: SectionId = SectionId(*b"TREE");
 pub const GROUPS: SectionId = SectionId(*b"GRUP");
-pub const PARENTS: SectionId = SectionId(*b"PARE");
+pub const INSTANCES: SectionId = SectionId(*b"INST");
 pub const FRAMES: SectionId = SectionId(*b"FRAM");
+pub const FORCED: SectionId = SectionId(*b"FORC");
 pub const LIGHTS: SectionId = SectionId(*b"LGHT");
 pub const PATHS: SectionId = SectionId(*b"PATH");
-pub const ALL: [SectionId; 7] = [META, TREES, GROUPS, PARENTS, FRAMES, LIGHTS, PATHS];
+pub const ALL: [SectionId; 8] = [META, TREES, GROUPS, INSTANCES, FRAMES, FORCED, LIGHTS, PATHS];
 
 /// One tree of a file.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
@@ -23,31 +25,45 @@ pub struct TreeRow {
     pub group_count: u32,
     /// How many leaves it has, at least 1.
     pub leaf_count: u32,
-    /// Zero.
-    pub reserved: u32,
+    /// A [`TreeKind`].
+    pub kind: u32,
     /// Bounds of everything in it. Its link is not used.
     pub root: Node,
 }
 
-/// The lane that leads to a group.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
-#[repr(transparent)]
-pub struct Parent(u32);
+/// What a tree is for. Trees stand in this order in a file.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[repr(u32)]
+pub enum TreeKind {
+    /// One light, in its own space: shared by its instances, or carried along, or forced.
+    Shared = 0,
+    /// All that stands still. At most one.
+    Still = 1,
+    /// All that changes as it is in one frame, above the tree of what stands still.
+    Frame = 2,
+}
 
-impl Parent {
-    /// Of the first group of a tree.
-    pub const NONE: Parent = Parent(0);
-
-    /// Lane `lane` of the group so many groups `back`, at least 1.
-    pub fn new(back: u32, lane: usize) -> Parent {
-        Parent(back << 3 | lane as u32)
+impl TreeKind {
+    /// The kind of a row, if it has one.
+    pub fn of(row: &TreeRow) -> Option<TreeKind> {
+        [TreeKind::Shared, TreeKind::Still, TreeKind::Frame]
+            .into_iter()
+            .find(|&kind| kind as u32 == row.kind)
     }
+}
 
-    /// How many groups back, and which lane; `None` at the root.
-    #[inline]
-    pub fn get(self) -> Option<(u32, usize)> {
-        (self.0 != 0).then_some((self.0 >> 3, (self.0 & 7) as usize))
-    }
+/// A tree put somewhere: what a leaf that is no emitter stands for.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
+pub struct InstanceRow {
+    /// From the space around it, world space, into the tree's own.
+    pub to_local: Similarity,
+    /// Row of the tree.
+    pub tree: u32,
+    /// The tree's emitters are numbered from here on.
+    pub first_emitter: u32,
+    /// Zero.
+    pub reserved: [u32; 2],
 }
 
 /// Which tree a frame samples.
@@ -58,6 +74,10 @@ pub struct FrameRow {
     pub frame: i32,
     /// Row of its tree; `u32::MAX` if nothing shines.
     pub tree: u32,
+    /// Its forced lights: entries of `FORC` from here on.
+    pub first_forced: u32,
+    /// How many forced lights it has.
+    pub forced_count: u32,
 }
 
 /// The tree of a frame in which nothing shines.
@@ -77,10 +97,25 @@ pub struct LightRow {
     pub path_offset: u32,
     /// Length of its path in bytes.
     pub path_length: u32,
-    /// Energy of its emitters, summed (of a moving light at its first frame).
+    /// Energy of its emitters, summed (of a light that changes in its first frame).
     pub energy: f32,
-    /// 1 if it moves, else 0.
-    pub moves: u32,
+    /// Sum of [`CHANGES`](LightRow::CHANGES), [`PLACED`](LightRow::PLACED) and
+    /// [`FORCED`](LightRow::FORCED).
+    pub class: u32,
     /// Zero.
     pub reserved: [u32; 2],
+}
+
+impl LightRow {
+    /// It moves or its brightness does: frames have trees of their own for it.
+    pub const CHANGES: u32 = 2;
+    /// Its emitters are in a shared tree, which an instance places.
+    pub const PLACED: u32 = 1;
+    /// It is in no tree but its own, and sampled always.
+    pub const FORCED: u32 = 4;
+
+    /// Whether its class has a property.
+    pub fn is(&self, property: u32) -> bool {
+        self.class & property != 0
+    }
 }

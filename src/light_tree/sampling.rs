@@ -1,192 +1,181 @@
-//! Picking one emitter for a receiver, and the probability of having picked it.
+//! Picking one emitter for a viewer.
 //!
 //! From the root down, a child is chosen with the probability `I / sum of I` of its group, one
-//! random number stretched over all choices (seed, "Method overview"). [`FrameTree::sample`] walks
-//! down; [`FrameTree::probability`] walks up from the emitter's leaf, by the lane that leads to each
-//! group. Both weigh a group by the same code, and there is no limit to the depth.
+//! random number stretched over all choices (seed, "Method overview"). What takes more than one
+//! sample is [beside](super::picks); what tells the probability of a pick, [too](super::probability).
+//! All weigh a group by the same code, and there is no limit to the depth.
 
+use super::cut::Picked;
 use super::group::{Group, WIDTH};
-use super::importance::Receiver;
+use super::leaves::{LeafTable, Leaves, Placed};
 use super::node::{Link, Node};
-use super::records::{Parent, TreeRow};
+use super::records::{InstanceRow, LightRow, TreeRow};
+use super::splitting::BELOW_ONE;
 use super::tree::{LightTree, NoSuchFrame};
+use super::viewer::Viewer;
 
-/// One emitter, picked.
+/// One light, picked.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pick {
-    /// Its number.
-    pub emitter: u32,
-    /// The probability of picking it for this receiver; positive.
+    /// Which.
+    pub light: Picked,
+    /// The probability of picking it for this viewer, given what was drawn for clusters that were
+    /// split: what its contribution is divided by. Positive.
     pub probability: f64,
+    /// The expected number of samples of it for this viewer, whatever is drawn: what it is weighed
+    /// with against other ways of finding it. Positive; equals `probability` without splitting.
+    pub expected: f64,
     /// What is left of the random number: uniform in `[0, 1)` and fresh.
     pub leftover: f64,
-}
-
-/// A lane of a group: the group's number times [`WIDTH`] plus the lane's.
-type Slot = u32;
-const NO_SLOT: Slot = u32::MAX;
-
-/// Where the leaf of every emitter that stands still is: what [`FrameTree::probability`] starts
-/// from. Made once for a shot by [`LightTree::leaf_table`].
-#[derive(Clone, Debug, Default)]
-pub struct LeafTable {
-    slot_of: Vec<Slot>,
 }
 
 /// The tree of one frame, ready to be sampled.
 #[derive(Clone)]
 pub struct FrameTree<'a> {
-    groups: &'a [Group],
-    parents: &'a [Parent],
-    trees: &'a [TreeRow],
-    root: Option<u32>,
-    /// The lane of the frame's tree that stands for the tree of what stands still.
-    below: Option<Slot>,
-    static_leaves: &'a LeafTable,
-    moving_slots: Vec<Slot>,
+    pub(super) groups: &'a [Group],
+    pub(super) trees: &'a [TreeRow],
+    pub(super) instances: &'a [InstanceRow],
+    pub(super) root: Option<u32>,
+    pub(super) table: &'a LeafTable,
+    /// The leaves of the frame's own tree, if things change.
+    pub(super) own: Option<Leaves>,
+    /// Forced lights, in the order of their emitters.
+    pub(super) forced: Vec<Placed>,
+    emitter_count: u32,
 }
 
 impl<D: AsRef<[u8]>> LightTree<D> {
-    /// Finds the leaves of all emitters that stand still.
-    pub fn leaf_table(&self) -> LeafTable {
-        let most = self.groups().len() * WIDTH;
-        let mut slot_of = vec![NO_SLOT; self.static_emitter_count().min(most)];
-        // The first tree holds what stands still, if anything does.
-        for (slot, link) in self.trees().first().into_iter().flat_map(|tree| self.links(tree)) {
-            if let Link::Emitter(emitter) = link
-                && let Some(entry) = slot_of.get_mut(emitter as usize)
-            {
-                *entry = slot;
-            }
-        }
-        LeafTable { slot_of }
-    }
-
-    /// Every used lane of a tree and where it leads.
-    fn links(&self, tree: &TreeRow) -> impl Iterator<Item = (Slot, Link)> + '_ {
-        let first = tree.first_group.wrapping_mul(WIDTH as u32);
-        let lanes = self.groups_of(tree).iter().flat_map(|g| (0..WIDTH).map(|lane| g.link(lane)));
-        lanes.enumerate().map(move |(i, link)| (first.wrapping_add(i as u32), link))
-    }
-
     /// The tree of a frame.
     ///
     /// # Errors
-    /// [`NoSuchFrame`] if lights move and the file was built without this frame.
+    /// [`NoSuchFrame`] if lights change and the file was built without this frame.
     pub fn at_frame<'a>(
         &'a self,
         frame: i32,
-        static_leaves: &'a LeafTable,
+        table: &'a LeafTable,
     ) -> Result<FrameTree<'a>, NoSuchFrame> {
-        let root = self.tree_at(frame)?.filter(|&row| (row as usize) < self.trees().len());
-        let fixed = self.static_emitter_count();
-        let moving = self.emitter_count().saturating_sub(fixed);
-        let mut moving_slots = vec![NO_SLOT; moving.min(self.groups().len() * WIDTH)];
-        let mut below = None;
-        if let Some(row) = root {
-            for (slot, link) in self.links(&self.trees()[row as usize]) {
-                match link {
-                    Link::Tree(_) => below = Some(slot),
-                    Link::Emitter(emitter) => {
-                        let at = (emitter as usize).checked_sub(fixed);
-                        if let Some(entry) = at.and_then(|at| moving_slots.get_mut(at)) {
-                            *entry = slot;
-                        }
-                    }
-                    Link::Inner(_) | Link::Nothing => {}
-                }
-            }
-        }
+        let (root, forced) = self.roots_at(frame)?;
+        let root = root.filter(|&row| (row as usize) < self.trees().len());
+        let changing = self.first_of_class(LightRow::CHANGES);
+        let placed = self.first_of_class(LightRow::CHANGES | LightRow::PLACED);
+        let own = root.filter(|_| !self.frames().is_empty());
+        let own = own.map(|row| self.leaves_of(&self.trees()[row as usize], changing..placed));
+        let forced = forced.iter().filter_map(|&instance| {
+            let row = self.instances().get(instance as usize)?;
+            Some(Placed { first_emitter: row.first_emitter, instance, slot: 0 })
+        });
         Ok(FrameTree {
             groups: self.groups(),
-            parents: self.parents(),
             trees: self.trees(),
+            instances: self.instances(),
             root,
-            below,
-            static_leaves,
-            moving_slots,
+            table,
+            own,
+            forced: forced.collect(),
+            emitter_count: self.emitter_count() as u32,
         })
     }
 }
 
-/// The largest number below 1.
-const BELOW_ONE: f64 = 1.0 - f64::EPSILON / 2.0;
+/// Where a walk stands: at a group of a tree, with the viewer in that tree's space.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Place<V> {
+    /// Row of the tree.
+    row: u32,
+    /// Number of the group.
+    pub at: u32,
+    /// The tree's emitters are numbered from here on.
+    first_emitter: u32,
+    pub viewer: V,
+}
+
+/// Where a lane leads.
+pub(super) enum Next<V> {
+    Emitter(u32),
+    Group(Place<V>),
+}
 
 impl FrameTree<'_> {
     /// Picks an emitter with a random number in `[0, 1)`; `None` where nothing can arrive (which a
     /// descent may learn only below a cluster whose bounds were too wide to know).
-    pub fn sample(&self, receiver: &Receiver, u: f64) -> Option<Pick> {
-        let mut row = self.root?;
-        let (mut u, mut probability, mut at) = (u, 1.0, self.trees[row as usize].first_group);
-        // Ends whatever the bytes: links lead onwards within a tree, and to earlier trees.
-        loop {
-            let group = self.groups.get(at as usize)?;
-            let choice = choose(group, receiver, u)?;
-            u = choice.leftover;
-            probability *= choice.probability;
-            match group.link(choice.lane) {
-                Link::Emitter(emitter) if self.knows(emitter) => {
-                    return Some(Pick { emitter, probability, leftover: u });
-                }
-                Link::Inner(ahead) => at = at.checked_add(ahead)?,
-                Link::Tree(below) if below < row => {
-                    row = below;
-                    at = self.trees.get(row as usize)?.first_group;
-                }
-                Link::Emitter(_) | Link::Tree(_) | Link::Nothing => return None,
-            }
-        }
+    pub fn sample(&self, viewer: &impl Viewer, u: f64) -> Option<Pick> {
+        self.descend(self.place_of_root(viewer)?, u)
     }
 
-    /// Whether there is an emitter of this number. In a sound tree there always is.
-    #[inline]
-    fn knows(&self, emitter: u32) -> bool {
-        (emitter as usize) < self.static_leaves.slot_of.len() + self.moving_slots.len()
+    /// Picks an emitter of a forced light, by its number among the forced lights.
+    pub fn sample_forced(&self, light: usize, viewer: &impl Viewer, u: f64) -> Option<Pick> {
+        self.descend(self.place_of_forced(light, viewer)?, u)
     }
 
-    /// The probability with which [`sample`](FrameTree::sample) picks an emitter for a receiver; 0
-    /// for one that it never picks.
-    pub fn probability(&self, receiver: &Receiver, emitter: u32) -> f64 {
-        self.try_probability(receiver, emitter).unwrap_or(0.0)
+    /// How many emitters belong to lights that are not forced: those that are come last.
+    pub fn unforced_count(&self) -> u32 {
+        self.forced.first().map_or(self.emitter_count, |first| first.first_emitter)
     }
 
-    fn try_probability(&self, receiver: &Receiver, emitter: u32) -> Option<f64> {
-        self.root?;
-        let fixed = self.static_leaves.slot_of.len();
-        match (emitter as usize).checked_sub(fixed) {
-            Some(moving) => self.chance_of(*self.moving_slots.get(moving)?, receiver),
-            None => {
-                let above = match self.below {
-                    Some(slot) => self.chance_of(slot, receiver)?,
-                    None => 1.0,
-                };
-                Some(
-                    above
-                        * self.chance_of(self.static_leaves.slot_of[emitter as usize], receiver)?,
-                )
-            }
-        }
+    /// How many lights are forced: sampled at every point, beside what is picked.
+    pub fn forced_count(&self) -> usize {
+        self.forced.len()
     }
 
-    /// The product of the choices that lead from the root of its tree to a lane.
-    fn chance_of(&self, slot: Slot, receiver: &Receiver) -> Option<f64> {
-        let (mut at, mut lane) = (slot / WIDTH as u32, (slot % WIDTH as u32) as usize);
+    pub(super) fn descend<V: Viewer>(&self, mut place: Place<V>, mut u: f64) -> Option<Pick> {
         let mut probability = 1.0;
         loop {
-            let weights = self.groups.get(at as usize)?.importances(receiver);
-            let total = sum(&weights);
-            if total <= 0.0 || !total.is_finite() {
-                return None;
-            }
-            probability *= weights[lane] / total;
-            match self.parents.get(at as usize)?.get() {
-                None => return Some(probability),
-                Some((back, parent_lane)) => {
-                    at = at.checked_sub(back.max(1))?;
-                    lane = parent_lane;
+            let group = self.group(&place)?;
+            let weights = Weights::of(group, &place.viewer)?;
+            let (lane, leftover) = weights.choose(u);
+            u = leftover;
+            probability *= weights.share(lane);
+            match self.follow(&place, group.link(lane))? {
+                Next::Group(next) => place = next,
+                Next::Emitter(emitter) => {
+                    let light = Picked::Emitter(emitter);
+                    return Some(Pick { light, probability, expected: probability, leftover: u });
                 }
             }
         }
+    }
+
+    pub(super) fn place_of_root<V: Viewer>(&self, viewer: &V) -> Option<Place<V>> {
+        let row = self.root?;
+        let at = self.trees[row as usize].first_group;
+        Some(Place { row, at, first_emitter: 0, viewer: *viewer })
+    }
+
+    pub(super) fn place_of_forced<V: Viewer>(&self, light: usize, viewer: &V) -> Option<Place<V>> {
+        let beyond = self.trees.len() as u32;
+        self.enter(beyond, self.forced.get(light)?.instance, viewer)
+    }
+
+    #[inline]
+    pub(super) fn group<V>(&self, place: &Place<V>) -> Option<&Group> {
+        self.groups.get(place.at as usize)
+    }
+
+    /// Where a lane leads; `None` if it lies. Every walk ends, whatever the bytes: links lead onwards
+    /// within a tree, and to earlier trees.
+    #[inline]
+    pub(super) fn follow<V: Viewer>(&self, place: &Place<V>, link: Link) -> Option<Next<V>> {
+        match link {
+            Link::Inner(ahead) => {
+                let at = place.at.checked_add(ahead)?;
+                Some(Next::Group(Place { at, ..*place }))
+            }
+            Link::Emitter(own) => {
+                let emitter = place.first_emitter.checked_add(own)?;
+                (emitter < self.emitter_count).then_some(Next::Emitter(emitter))
+            }
+            Link::Instance(row) => self.enter(place.row, row, &place.viewer).map(Next::Group),
+            Link::Nothing => None,
+        }
+    }
+
+    /// The root of an instance, which must be of an earlier tree than a row.
+    fn enter<V: Viewer>(&self, before: u32, instance: u32, viewer: &V) -> Option<Place<V>> {
+        let instance = self.instances.get(instance as usize)?;
+        let row = Some(instance.tree).filter(|&row| row < before)?;
+        let at = self.trees.get(row as usize)?.first_group;
+        let viewer = viewer.within(&instance.to_local);
+        Some(Place { row, at, first_emitter: instance.first_emitter, viewer })
     }
 
     /// The node of everything; `None` if nothing shines.
@@ -194,61 +183,83 @@ impl FrameTree<'_> {
         self.root.map(|row| &self.trees[row as usize].root)
     }
 
-    /// The importance of everything at a receiver; 0 if nothing shines.
-    pub fn total_importance(&self, receiver: &Receiver) -> f64 {
-        self.root().map_or(0.0, |root| root.importance(receiver))
+    /// The importance of everything at a viewer; 0 if nothing shines.
+    pub fn total_importance(&self, viewer: &impl Viewer) -> f64 {
+        self.root().map_or(0.0, |root| root.importance(viewer))
     }
 
-    /// Calls `visit` with every emitter and its leaf's node: what a perfect traversal would weigh.
-    pub fn for_each_leaf(&self, mut visit: impl FnMut(u32, &Node)) {
-        let mut next = self.root;
-        while let Some(row) = next {
-            next = None;
-            let Some(tree) = self.trees.get(row as usize) else { return };
+    /// Calls `visit` with every emitter that is not forced, its importance to the viewer and its
+    /// energy: what a perfect traversal would weigh.
+    pub fn for_each_leaf(&self, viewer: &impl Viewer, mut visit: impl FnMut(u32, f64, f64)) {
+        let Some(place) = self.place_of_root(viewer) else { return };
+        let mut open = vec![(place, 1.0, 1.0)];
+        while let Some((place, factor, energy_factor)) = open.pop() {
+            let tree = &self.trees[place.row as usize];
             let rest = self.groups.get(tree.first_group as usize..).unwrap_or_default();
-            let groups = &rest[..rest.len().min(tree.group_count as usize)];
-            for node in groups.iter().flat_map(Group::nodes) {
-                match node.link() {
-                    Link::Emitter(emitter) if self.knows(emitter) => visit(emitter, &node),
-                    Link::Tree(below) if below < row => next = Some(below),
-                    _ => {}
+            for group in &rest[..rest.len().min(tree.group_count as usize)] {
+                let weights = group.importances(&place.viewer);
+                for (lane, weight) in weights.into_iter().enumerate() {
+                    let Some(node) = group.node(lane) else { continue };
+                    let energy = f64::from(node.energy());
+                    match node.link() {
+                        Link::Emitter(_) => {
+                            if let Some(Next::Emitter(emitter)) = self.follow(&place, node.link()) {
+                                visit(emitter, weight * factor, energy * energy_factor);
+                            }
+                        }
+                        Link::Instance(row) => {
+                            let Some(below) = self.enter(place.row, row, &place.viewer) else {
+                                continue;
+                            };
+                            // What the leaf says of the tree's energy, in the tree's own space.
+                            let instance = &self.instances[row as usize];
+                            let scale = f64::from(instance.to_local.scale());
+                            let own = f64::from(self.trees[below.row as usize].root.energy());
+                            let brighter = energy * scale * scale / own;
+                            let outside = place.viewer.unit_of_importance(scale);
+                            let energy_factor = energy_factor * energy / own;
+                            open.push((below, factor * brighter * outside, energy_factor));
+                        }
+                        Link::Inner(_) | Link::Nothing => {}
+                    }
                 }
             }
         }
     }
 }
 
-/// A child, chosen.
-struct Choice {
-    lane: usize,
-    probability: f64,
-    leftover: f64,
+/// The importances of a group's lanes, of which one at least is not zero.
+pub(super) struct Weights {
+    pub of_lane: [f64; WIDTH],
+    total: f64,
 }
 
-/// Chooses a child of a group by its share of the importance; `None` if all have none.
-#[inline]
-fn choose(group: &Group, receiver: &Receiver, u: f64) -> Option<Choice> {
-    let weights = group.importances(receiver);
-    let total = sum(&weights);
-    if total <= 0.0 || !total.is_finite() {
-        return None;
+impl Weights {
+    #[inline]
+    pub fn of(group: &Group, viewer: &impl Viewer) -> Option<Weights> {
+        let of_lane = group.importances(viewer);
+        let total: f64 = of_lane.iter().sum();
+        (total > 0.0 && total.is_finite()).then_some(Weights { of_lane, total })
     }
-    let target = u * total;
-    let (mut lane, mut before, mut running) = (0, 0.0, 0.0);
-    for (i, weight) in weights.iter().enumerate() {
-        // The last lane with a weight whose stretch begins at or before the target.
-        let begins = *weight > 0.0 && running <= target;
-        lane = if begins { i } else { lane };
-        before = if begins { running } else { before };
-        running += weight;
-    }
-    let weight = weights[lane];
-    let leftover = ((target - before) / weight).clamp(0.0, BELOW_ONE);
-    Some(Choice { lane, probability: weight / total, leftover })
-}
 
-/// The sum of a group's weights, in the order in which they are walked through.
-#[inline]
-fn sum(weights: &[f64; WIDTH]) -> f64 {
-    weights.iter().sum()
+    /// The probability of a lane.
+    #[inline]
+    pub fn share(&self, lane: usize) -> f64 {
+        self.of_lane[lane] / self.total
+    }
+
+    /// Chooses a lane by its share, and returns what is left of the random number.
+    #[inline]
+    pub fn choose(&self, u: f64) -> (usize, f64) {
+        let target = u * self.total;
+        let (mut lane, mut before, mut running) = (0, 0.0, 0.0);
+        for (i, weight) in self.of_lane.iter().enumerate() {
+            // The last lane with a weight whose stretch begins at or before the target.
+            let begins = *weight > 0.0 && running <= target;
+            lane = if begins { i } else { lane };
+            before = if begins { running } else { before };
+            running += weight;
+        }
+        (lane, ((target - before) / self.of_lane[lane]).clamp(0.0, BELOW_ONE))
+    }
 }

@@ -1,7 +1,7 @@
 //! A light tree file, opened: the same type over bytes just built and bytes just mapped.
 
 use super::group::Group;
-use super::records::{self, FrameRow, LightRow, NO_TREE, Parent, TreeRow};
+use super::records::{self, FrameRow, InstanceRow, LightRow, NO_TREE, TreeKind, TreeRow};
 use crate::store::{Container, Section, SectionId, StoreError};
 use bytemuck::Pod;
 use std::ops::Range;
@@ -15,8 +15,9 @@ pub struct LightTree<D> {
     container: Container<D>,
     trees: Range<usize>,
     groups: Range<usize>,
-    parents: Range<usize>,
+    instances: Option<Range<usize>>,
     frames: Option<Range<usize>>,
+    forced: Option<Range<usize>>,
     lights: Range<usize>,
     paths: Range<usize>,
 }
@@ -37,8 +38,9 @@ impl<D: AsRef<[u8]>> LightTree<D> {
         Ok(LightTree {
             trees: required::<TreeRow>(&container, records::TREES)?,
             groups: required::<Group>(&container, records::GROUPS)?,
-            parents: required::<Parent>(&container, records::PARENTS)?,
+            instances: container.find::<InstanceRow>(records::INSTANCES)?,
             frames: container.find::<FrameRow>(records::FRAMES)?,
+            forced: container.find::<u32>(records::FORCED)?,
             lights: required::<LightRow>(&container, records::LIGHTS)?,
             paths: required::<u8>(&container, records::PATHS)?,
             container,
@@ -65,9 +67,14 @@ impl<D: AsRef<[u8]>> LightTree<D> {
         self.container.view(&self.groups)
     }
 
-    /// For each group the lane that leads to it.
-    pub fn parents(&self) -> &[Parent] {
-        self.container.view(&self.parents)
+    /// Trees put somewhere.
+    pub fn instances(&self) -> &[InstanceRow] {
+        self.instances.as_ref().map_or(&[], |range| self.container.view(range))
+    }
+
+    /// The instances of forced lights, frame after frame if there are frames.
+    pub fn forced(&self) -> &[u32] {
+        self.forced.as_ref().map_or(&[], |range| self.container.view(range))
     }
 
     /// The groups of one tree.
@@ -76,7 +83,7 @@ impl<D: AsRef<[u8]>> LightTree<D> {
         &rest[..rest.len().min(tree.group_count as usize)]
     }
 
-    /// The frames that have a tree of their own; empty if nothing moves.
+    /// The frames that have a tree of their own; empty if nothing changes.
     pub fn frames(&self) -> &[FrameRow] {
         self.frames.as_ref().map_or(&[], |range| self.container.view(range))
     }
@@ -99,10 +106,11 @@ impl<D: AsRef<[u8]>> LightTree<D> {
         self.lights().last().map_or(0, |l| l.first_emitter as usize + l.emitter_count as usize)
     }
 
-    /// Number of emitters that stand still: they come first.
-    pub fn static_emitter_count(&self) -> usize {
-        let moving = self.lights().iter().find(|light| light.moves != 0);
-        moving.map_or(self.emitter_count(), |light| light.first_emitter as usize)
+    /// The number of the first emitter whose light has a class of at least this.
+    pub(super) fn first_of_class(&self, class: u32) -> u32 {
+        let lights = self.lights();
+        let row = lights.partition_point(|light| light.class < class);
+        lights.get(row).map_or(self.emitter_count() as u32, |light| light.first_emitter)
     }
 
     /// The `META` section: a JSON text for people.
@@ -127,17 +135,26 @@ impl<D: AsRef<[u8]>> LightTree<D> {
         self.container.verify_checksums()
     }
 
-    /// The row of the tree that a frame samples: `Ok(None)` if nothing shines then.
+    /// What a frame samples: the row of its tree, `None` if nothing shines then, and the instances
+    /// of its forced lights.
     ///
     /// # Errors
-    /// [`NoSuchFrame`] if lights move and the file was built without this frame.
-    pub fn tree_at(&self, frame: i32) -> Result<Option<u32>, NoSuchFrame> {
+    /// [`NoSuchFrame`] if lights change and the file was built without this frame.
+    pub(super) fn roots_at(&self, frame: i32) -> Result<(Option<u32>, &[u32]), NoSuchFrame> {
+        let forced = self.forced();
         if self.frames.is_none() {
-            return Ok((!self.trees().is_empty()).then_some(0));
+            let still = |row: &TreeRow| TreeKind::of(row) == Some(TreeKind::Still);
+            let root = self.trees().iter().position(still).map(|row| row as u32);
+            return Ok((root, forced));
         }
         let frames = self.frames();
         match frames.binary_search_by_key(&frame, |row| row.frame) {
-            Ok(found) => Ok(Some(frames[found].tree).filter(|&tree| tree != NO_TREE)),
+            Ok(found) => {
+                let FrameRow { tree, first_forced, forced_count, .. } = frames[found];
+                let rest = forced.get(first_forced as usize..).unwrap_or_default();
+                let own = &rest[..rest.len().min(forced_count as usize)];
+                Ok((Some(tree).filter(|&tree| tree != NO_TREE), own))
+            }
             Err(_) => Err(NoSuchFrame {
                 frame,
                 first: frames.first().map_or(0, |row| row.frame),
@@ -147,10 +164,10 @@ impl<D: AsRef<[u8]>> LightTree<D> {
     }
 }
 
-/// Lights move and the tree was built for other frames.
+/// Lights change and the tree was built for other frames.
 #[derive(Debug, thiserror::Error, PartialEq, Eq)]
 #[error(
-    "the tree has no frame {frame}: lights move and it was built for frames {first} to {last}; build it again with `--frames`"
+    "the tree has no frame {frame}: lights change and it was built for frames {first} to {last}; build it again with `--frames`"
 )]
 pub struct NoSuchFrame {
     /// The frame asked for.

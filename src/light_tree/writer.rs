@@ -1,9 +1,11 @@
 //! Gathers the trees of a shot and lays them out as a file.
 
-use super::builder::{Groups, build_tree};
+use super::builder::build_tree;
+use super::group::{Group, WIDTH};
 use super::node::{Link, Node};
-use super::records::{self, FrameRow, LightRow, NO_TREE, TreeRow};
+use super::records::{self, FrameRow, InstanceRow, LightRow, NO_TREE, TreeKind, TreeRow};
 use crate::bounds::LightBounds;
+use crate::math::Similarity;
 use crate::store::{AlignedBytes, ContainerWriter};
 
 /// What a tree file says of one light.
@@ -17,16 +19,18 @@ pub struct LightSummary {
     pub emitter_count: u32,
     /// Their energy, summed.
     pub energy: f32,
-    /// Whether it moves within the shot.
-    pub moves: bool,
+    /// Sum of [`LightRow::CHANGES`], [`LightRow::PLACED`] and [`LightRow::FORCED`].
+    pub class: u32,
 }
 
 /// Builds the trees of a shot, one after the other, and writes them down.
 #[derive(Default)]
 pub struct LightTreeWriter {
     trees: Vec<TreeRow>,
-    groups: Groups,
+    groups: Vec<Group>,
+    instances: Vec<InstanceRow>,
     frames: Vec<FrameRow>,
+    forced: Vec<u32>,
     lights: Vec<LightRow>,
     paths: Vec<u8>,
     emitter_count: u32,
@@ -34,33 +38,81 @@ pub struct LightTreeWriter {
 
 impl LightTreeWriter {
     /// Builds a tree over some bounds and returns its row; `stands_for` tells what each of them is:
-    /// an emitter or a tree added earlier. No bounds give no tree.
+    /// an emitter or an instance of a tree added earlier. No bounds give no tree. Trees must be added
+    /// in the order of their kinds.
     pub fn add_tree(
         &mut self,
+        kind: TreeKind,
         bounds: &[LightBounds],
         stands_for: impl Fn(usize) -> Link + Sync,
     ) -> Option<u32> {
-        let first_group = self.groups.groups.len();
+        let first_group = self.groups.len();
         let root = build_tree(bounds, &stands_for, &mut self.groups)?;
         self.trees.push(TreeRow {
             first_group: first_group as u32,
-            group_count: (self.groups.groups.len() - first_group) as u32,
+            group_count: (self.groups.len() - first_group) as u32,
             leaf_count: bounds.len() as u32,
-            reserved: 0,
+            kind: kind as u32,
             root: Node::encode(&root, Link::Nothing),
         });
         Some(self.trees.len() as u32 - 1)
     }
 
-    /// The bounds of a whole tree, as a leaf of another has them.
+    /// Adds a copy of the last tree, for a frame in which the same leaves stand in the same places
+    /// but shine differently: its clusters stay and their energies are summed anew.
+    ///
+    /// # Panics
+    /// If there is no tree yet.
+    pub fn add_tree_with_energies(&mut self, energy_of: impl Fn(Link) -> f32) -> u32 {
+        let mut row = *self.trees.last().expect("there is a tree to copy");
+        let (start, end) = (row.first_group as usize, (row.first_group + row.group_count) as usize);
+        row.first_group = self.groups.len() as u32;
+        self.groups.extend_from_within(start..end);
+        let groups = &mut self.groups[row.first_group as usize..];
+        let mut sums = vec![0f32; groups.len()];
+        for own in (0..groups.len()).rev() {
+            let mut sum = 0.0;
+            for lane in 0..WIDTH {
+                let energy = match groups[own].link(lane) {
+                    Link::Nothing => continue,
+                    Link::Inner(ahead) => sums[own + ahead as usize],
+                    leaf => energy_of(leaf),
+                };
+                groups[own].set_energy(lane, energy);
+                sum += f64::from(energy);
+            }
+            sums[own] = sum as f32;
+        }
+        row.root = row.root.with_energy(sums[0]);
+        self.trees.push(row);
+        self.trees.len() as u32 - 1
+    }
+
+    /// The bounds of a whole tree, as a leaf of another has them, in the tree's own space.
     pub fn bounds_of(&self, tree: u32) -> LightBounds {
         self.trees[tree as usize].root.bounds()
     }
 
-    /// Says which tree a frame samples. Frames must be added in ascending order. Without any, every
-    /// frame samples tree 0.
-    pub fn add_frame(&mut self, frame: i32, tree: Option<u32>) {
-        self.frames.push(FrameRow { frame, tree: tree.unwrap_or(NO_TREE) });
+    /// Puts a tree somewhere, its emitters numbered from `first_emitter` on; returns the row of the
+    /// instance. `to_local` leads from world space to the tree's own.
+    pub fn add_instance(&mut self, tree: u32, to_local: Similarity, first_emitter: u32) -> u32 {
+        self.instances.push(InstanceRow { to_local, tree, first_emitter, reserved: [0; 2] });
+        self.instances.len() as u32 - 1
+    }
+
+    /// Says which tree a frame samples and which instances are of forced lights. Frames must be added
+    /// in ascending order. Without any, every frame samples the tree of what stands still.
+    pub fn add_frame(&mut self, frame: i32, tree: Option<u32>, forced: &[u32]) {
+        let first_forced = self.forced.len() as u32;
+        let forced_count = forced.len() as u32;
+        self.forced.extend_from_slice(forced);
+        let tree = tree.unwrap_or(NO_TREE);
+        self.frames.push(FrameRow { frame, tree, first_forced, forced_count });
+    }
+
+    /// Says which instances are of forced lights where there are no frames.
+    pub fn add_forced(&mut self, instances: &[u32]) {
+        self.forced.extend_from_slice(instances);
     }
 
     /// Adds a light; its emitters are numbered after those of the lights before it.
@@ -72,7 +124,7 @@ impl LightTreeWriter {
             path_offset: self.paths.len() as u32,
             path_length: light.path.len() as u32,
             energy: light.energy,
-            moves: light.moves.into(),
+            class: light.class,
             reserved: [0; 2],
         });
         self.emitter_count += light.emitter_count;
@@ -84,10 +136,15 @@ impl LightTreeWriter {
         let mut file = ContainerWriter::default();
         file.section(records::META, false, meta.as_bytes());
         file.section(records::TREES, true, &self.trees);
-        file.section(records::GROUPS, true, &self.groups.groups);
-        file.section(records::PARENTS, true, &self.groups.parents);
+        file.section(records::GROUPS, true, &self.groups);
+        if !self.instances.is_empty() {
+            file.section(records::INSTANCES, true, &self.instances);
+        }
         if !self.frames.is_empty() {
             file.section(records::FRAMES, true, &self.frames);
+        }
+        if !self.forced.is_empty() {
+            file.section(records::FORCED, true, &self.forced);
         }
         file.section(records::LIGHTS, true, &self.lights);
         file.section(records::PATHS, true, &self.paths);

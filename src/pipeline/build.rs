@@ -1,8 +1,13 @@
 //! Building the trees of a shot.
 
 use super::Survey;
-use crate::light_tree::{ALGORITHM_VERSION, LightTreeWriter, Link};
+use super::survey::{Group, PlacedLight};
+use crate::bounds::{Aabb, Cone, LightBounds};
+use crate::light_tree::{ALGORITHM_VERSION, LightTreeWriter, Link, TreeKind};
+use crate::math::Similarity;
 use crate::store::AlignedBytes;
+use glam::{Affine3A, Mat3, Vec3};
+use std::collections::HashMap;
 
 /// What a build is told besides the scene.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -11,25 +16,146 @@ pub struct BuildOptions {
     pub program: String,
 }
 
-/// Builds the trees: one over what stands still, and one a frame over that tree and what moves.
-/// The same survey gives the same bytes.
+/// Builds the trees: one in its own space for each light that is shared, carried along or forced; one
+/// over what stands still; and one a frame over that tree and what changes. The same survey gives the
+/// same bytes.
 pub fn build_tree(survey: &Survey, options: &BuildOptions) -> AlignedBytes {
-    let mut writer = LightTreeWriter::default();
-    let fixed = writer.add_tree(&survey.fixed, |i| Link::Emitter(i as u32));
-    let first_moving = survey.fixed.len() as u32;
-    for (frame, moving) in &survey.moving {
-        let mut bounds = moving.clone();
-        bounds.extend(fixed.map(|tree| writer.bounds_of(tree)));
-        let tree = writer.add_tree(&bounds, |i| match i < moving.len() {
-            true => Link::Emitter(first_moving + i as u32),
-            false => Link::Tree(fixed.unwrap_or_default()),
-        });
-        writer.add_frame(*frame, tree);
+    let mut builder = Builder { writer: LightTreeWriter::default(), shared: Vec::new() };
+    for shared in &survey.shared {
+        let tree = builder.writer.add_tree(TreeKind::Shared, &shared.bounds, own);
+        builder.shared.push(tree.expect("a light has emitters"));
     }
+    let links = builder.links(&survey.still, None);
+    let bounds = builder.bounds(&survey.still, None);
+    let still = builder.writer.add_tree(TreeKind::Still, &bounds, |i| links[i]);
+    let forced_still = builder.instances(&survey.still.forced);
+    if survey.frames.is_empty() {
+        builder.writer.add_forced(&forced_still);
+    } else {
+        let below = still.map(|still| {
+            let leaf = builder.writer.bounds_of(still);
+            (Link::Instance(builder.writer.add_instance(still, Similarity::IDENTITY, 0)), leaf)
+        });
+        builder.frames(survey, still, below, &forced_still);
+    }
+    let mut writer = builder.writer;
     survey.lights.iter().for_each(|light| writer.add_light(light));
     let meta = serde_json::json!({
         "program": options.program,
         "algorithmVersion": ALGORITHM_VERSION,
     });
     writer.finish(&meta.to_string(), survey.fingerprint)
+}
+
+/// In its own space a light numbers its emitters from 0 on.
+fn own(emitter: usize) -> Link {
+    Link::Emitter(emitter as u32)
+}
+
+struct Builder {
+    writer: LightTreeWriter,
+    /// Row of the tree of each row of the survey's shared lights.
+    shared: Vec<u32>,
+}
+
+impl Builder {
+    fn frames(
+        &mut self,
+        survey: &Survey,
+        still: Option<u32>,
+        below: Option<(Link, LightBounds)>,
+        forced_still: &[u32],
+    ) {
+        let mut before: Option<(&Group, Vec<Link>)> = None;
+        for (frame, group) in &survey.frames {
+            let mut forced = forced_still.to_vec();
+            forced.extend(self.instances(&group.forced));
+            if group.flat.is_empty() && group.placed.is_empty() {
+                self.writer.add_frame(*frame, still, &forced);
+                continue;
+            }
+            // Where only brightness has changed, the clusters of the frame before will do.
+            if let Some((last, links)) = &before
+                && stand_alike(last, group)
+            {
+                let bounds = self.bounds(group, below.as_ref());
+                let energies: HashMap<Link, f32> =
+                    links.iter().copied().zip(bounds.iter().map(|b| b.energy)).collect();
+                let tree = self.writer.add_tree_with_energies(|link| energies[&link]);
+                self.writer.add_frame(*frame, Some(tree), &forced);
+                continue;
+            }
+            let links = self.links(group, below.as_ref());
+            let bounds = self.bounds(group, below.as_ref());
+            let tree = self.writer.add_tree(TreeKind::Frame, &bounds, |i| links[i]);
+            self.writer.add_frame(*frame, tree, &forced);
+            before = Some((group, links));
+        }
+    }
+
+    /// What the leaves of a group stand for; and one for the tree below, if there is one.
+    fn links(&mut self, group: &Group, below: Option<&(Link, LightBounds)>) -> Vec<Link> {
+        let flat = (group.first..).take(group.flat.len()).map(Link::Emitter);
+        let mut links: Vec<Link> = flat.collect();
+        links.extend(self.instances(&group.placed).into_iter().map(Link::Instance));
+        links.extend(below.map(|(link, _)| *link));
+        links
+    }
+
+    /// Their bounds.
+    fn bounds(&self, group: &Group, below: Option<&(Link, LightBounds)>) -> Vec<LightBounds> {
+        let mut bounds = group.flat.clone();
+        bounds.extend(group.placed.iter().map(|placed| {
+            let own = self.writer.bounds_of(self.shared[placed.shared as usize]);
+            in_world(&own, placed)
+        }));
+        bounds.extend(below.map(|(_, leaf)| *leaf));
+        bounds
+    }
+
+    fn instances(&mut self, placed: &[PlacedLight]) -> Vec<u32> {
+        let add = |p: &PlacedLight| {
+            let tree = self.shared[p.shared as usize];
+            self.writer.add_instance(tree, p.to_local, p.first_emitter)
+        };
+        placed.iter().map(add).collect()
+    }
+}
+
+/// Whether two frames differ in nothing but energies.
+fn stand_alike(a: &Group, b: &Group) -> bool {
+    let place = |bounds: &LightBounds| LightBounds { energy: 1.0, ..*bounds };
+    let dull = |placed: &PlacedLight| (placed.shared, placed.to_local, placed.first_emitter);
+    a.flat.iter().map(place).eq(b.flat.iter().map(place))
+        && a.placed.iter().map(dull).eq(b.placed.iter().map(dull))
+}
+
+/// The bounds of a tree in its own space as they are in world space, a little wider.
+fn in_world(own: &LightBounds, placed: &PlacedLight) -> LightBounds {
+    /// What rounding may turn an axis by, radians.
+    const TURN: f32 = 1e-6;
+    let to_local = Affine3A::from_mat3_translation(
+        Mat3::from_cols_array_2d(&placed.to_local.axes),
+        Vec3::from_array(placed.to_local.origin),
+    );
+    let to_world = to_local.inverse();
+    let box_in_world = own.aabb.transformed(&to_world);
+    let size = box_in_world.min.abs().max(box_in_world.max.abs()).max_element()
+        + box_in_world.extent().max_element();
+    let slack = Vec3::splat(4.0 * f32::EPSILON * size);
+    let is_flat = own.cone.theta_o == 0.0;
+    LightBounds {
+        aabb: Aabb { min: box_in_world.min - slack, max: box_in_world.max + slack },
+        cone: Cone {
+            axis: to_world.transform_vector3(own.cone.axis).normalize_or(Vec3::Z),
+            theta_o: if is_flat {
+                TURN
+            } else {
+                (own.cone.theta_o + TURN).min(std::f32::consts::PI)
+            },
+            ..own.cone
+        },
+        energy: (own.energy * placed.brightness).max(f32::MIN_POSITIVE),
+        range_m: own.range_m / placed.to_local.scale(),
+    }
 }

@@ -117,9 +117,9 @@ pub fn check_fresh<D: AsRef<[u8]>>(
         return Err(TreeError::Stale { path: path.into(), cause: compare(tree, &lights) });
     }
     // Nobody may have verified the tree: its list of lights is not under the header's checksum.
-    let agrees = tree.emitter_count() == emitters.len()
-        && tree.static_emitter_count() == emitters.static_count();
-    if agrees {
+    let told = tree.lights().iter().map(|row| (row.first_emitter, row.emitter_count, row.class));
+    let known = emitters.lights().iter().zip(&lights);
+    if told.eq(known.map(|(light, summary)| (light.first, light.count, summary.class))) {
         return Ok(());
     }
     let cause = StoreError::Checksum { part: "the list of lights".into() };
@@ -130,12 +130,10 @@ fn compare<D: AsRef<[u8]>>(tree: &LightTree<D>, now: &[LightSummary]) -> StaleTr
     let before: BTreeMap<&str, _> = tree
         .lights()
         .iter()
-        .map(|row| (tree.light_path(row), (row.fingerprint, row.moves)))
+        .map(|row| (tree.light_path(row), (row.fingerprint, row.class)))
         .collect();
-    let after: BTreeMap<&str, _> = now
-        .iter()
-        .map(|light| (light.path.as_str(), (light.fingerprint, u32::from(light.moves))))
-        .collect();
+    let after: BTreeMap<&str, _> =
+        now.iter().map(|light| (light.path.as_str(), (light.fingerprint, light.class))).collect();
     let names = |paths: &mut dyn Iterator<Item = &&str>| paths.map(|p| p.to_string()).collect();
     StaleTree {
         added: names(&mut after.keys().filter(|path| !before.contains_key(*path))),

@@ -5,16 +5,20 @@
 //! which lights changed.
 
 mod build;
+mod camera;
 mod content;
+mod forced;
 mod frames;
 mod fresh;
 mod survey;
 
 pub use build::{BuildOptions, build_tree};
+pub use camera::{NoCamera, find_camera};
 pub use content::scene_fingerprint;
+pub use forced::{NoLightThere, force_lights};
 pub use frames::frames_of;
 pub use fresh::{OpenedTree, StaleTree, TreeError, check_fresh, open_tree};
-pub use survey::{Survey, survey};
+pub use survey::{Group, PlacedLight, SharedBounds, Survey, survey};
 
 use crate::ingest::{self, IngestError};
 use crate::scene::Scene;

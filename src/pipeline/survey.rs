@@ -1,121 +1,273 @@
 //! What a tree depends on: the bounds of all emitters in all frames, and their fingerprints.
 
 use crate::bounds::LightBounds;
-use crate::emitter::{Emitters, LightOverflow, PosedEmitters};
-use crate::light_tree::{ALGORITHM_VERSION, LightSummary};
-use crate::scene::Scene;
+use crate::emitter::{Emitters, LightEntry, LightOverflow, LightSource, PosedEmitters};
+use crate::light_tree::{ALGORITHM_VERSION, LightRow, LightSummary};
+use crate::math::Similarity;
+use crate::scene::{Pose, Scene};
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// Everything that the trees of a shot are built over.
 pub struct Survey {
-    /// Bounds of the emitters that stand still.
-    pub fixed: Vec<LightBounds>,
-    /// For each frame, the bounds of the emitters that move; empty if none does.
-    pub moving: Vec<(i32, Vec<LightBounds>)>,
+    /// What has a tree of its own, in its own space.
+    pub shared: Vec<SharedBounds>,
+    /// What stands still, in world space.
+    pub still: Group,
+    /// What changes, frame by frame; empty if nothing does.
+    pub frames: Vec<(i32, Group)>,
     /// What the file says of each light.
     pub lights: Vec<LightSummary>,
     /// Of all of the above, and of the algorithm that builds over it.
     pub fingerprint: [u8; 32],
 }
 
-/// Surveys a scene for some frames (ascending). If no light moves the frames do not matter.
+/// The bounds of a light that has a tree of its own.
+pub struct SharedBounds {
+    /// In the order of its emitters.
+    pub bounds: Vec<LightBounds>,
+    energy: f64,
+    fingerprint: [u8; 32],
+}
+
+/// What is sampled together.
+#[derive(Default)]
+pub struct Group {
+    /// The number of the first emitter that has a leaf of its own.
+    pub first: u32,
+    /// Bounds of those emitters, world space.
+    pub flat: Vec<LightBounds>,
+    /// Trees that are put somewhere.
+    pub placed: Vec<PlacedLight>,
+    /// Trees of forced lights.
+    pub forced: Vec<PlacedLight>,
+}
+
+/// A tree of its own, put somewhere.
+#[derive(Clone, Copy, PartialEq)]
+pub struct PlacedLight {
+    /// Row of [`Survey::shared`].
+    pub shared: u32,
+    /// From world space to the tree's own.
+    pub to_local: Similarity,
+    /// What the energies of the tree's own space are multiplied by.
+    pub brightness: f32,
+    /// Its emitters are numbered from here on.
+    pub first_emitter: u32,
+    /// Its light.
+    light: u32,
+}
+
+/// Surveys a scene for some frames (ascending). If no light changes the frames do not matter.
 ///
 /// # Errors
 /// A light that is too far away or too strong for `f32`.
 pub fn survey(scene: &Scene, emitters: &Emitters, frames: &[i32]) -> Result<Survey, LightOverflow> {
-    let at = |frame: i32| scene.pose_at(scene.timeline.seconds_at(f64::from(frame)));
-    let still = scene.pose_at(0.0);
-    let fixed = PosedEmitters { scene, emitters, pose: &still }.bounds(false)?;
-    let any_moves = emitters.static_count() < emitters.len();
-    let moving = if any_moves { frames } else { &[] }
+    let mut surveyor = Surveyor { scene, emitters, shared: Vec::new(), own: Vec::new() };
+    surveyor.own = vec![None; emitters.mesh_lights().len()];
+    let pose = scene.pose_at(0.0);
+    let still = surveyor.group(&pose, false)?;
+    let any_changes = emitters.lights().iter().any(LightEntry::changes);
+    let frames = if any_changes { frames } else { &[] }
         .iter()
         .map(|&frame| {
-            let pose = at(frame);
-            Ok((frame, PosedEmitters { scene, emitters, pose: &pose }.bounds(true)?))
+            let pose = scene.pose_at(scene.timeline.seconds_at(f64::from(frame)));
+            Ok((frame, surveyor.group(&pose, true)?))
         })
         .collect::<Result<Vec<_>, LightOverflow>>()?;
-    check_total(emitters, &fixed, &moving)?;
-    let lights = summaries(emitters, &fixed, &moving);
-    let fingerprint = whole(&lights, &moving);
-    Ok(Survey { fixed, moving, lights, fingerprint })
+    let shared = surveyor.shared;
+    check_total(emitters, &shared, &still, &frames)?;
+    let lights = summaries(emitters, &shared, &still, &frames);
+    let fingerprint = whole(&lights, &frames);
+    Ok(Survey { shared, still, frames, lights, fingerprint })
+}
+
+struct Surveyor<'a> {
+    scene: &'a Scene,
+    emitters: &'a Emitters,
+    shared: Vec<SharedBounds>,
+    /// For each mesh light its row of `shared`, once it is known.
+    own: Vec<Option<u32>>,
+}
+
+impl Surveyor<'_> {
+    /// The lights that stand still, or those that change.
+    fn group(&mut self, pose: &Pose, changing: bool) -> Result<Group, LightOverflow> {
+        let Surveyor { scene, emitters, .. } = *self;
+        let posed = PosedEmitters { scene, emitters, pose };
+        let mut flat: Option<Range<u32>> = None;
+        let mut group = Group::default();
+        for (row, light) in (0..).zip(emitters.lights()) {
+            let of_light = light.first..light.first + light.count;
+            if light.changes() != changing {
+                continue;
+            }
+            if light.in_own_space || light.forced {
+                let placed = self.place(&posed, row, light)?;
+                if light.forced { &mut group.forced } else { &mut group.placed }.push(placed);
+            } else {
+                flat = Some(flat.map_or(of_light.clone(), |flat| flat.start..of_light.end));
+            }
+        }
+        let flat = flat.unwrap_or(0..0);
+        group.first = flat.start;
+        group.flat = posed.bounds(flat)?;
+        Ok(group)
+    }
+
+    fn place(
+        &mut self,
+        posed: &PosedEmitters,
+        row: u32,
+        light: &LightEntry,
+    ) -> Result<PlacedLight, LightOverflow> {
+        let placed = |shared, to_local, brightness| PlacedLight {
+            shared,
+            to_local,
+            brightness,
+            first_emitter: light.first,
+            light: row,
+        };
+        if let LightSource::Mesh { mesh_light, .. } = light.source
+            && light.in_own_space
+        {
+            let (to_local, brightness) =
+                posed.placing(row).ok_or_else(|| LightOverflow { path: light.path.clone() })?;
+            let shared = match self.own[mesh_light as usize] {
+                Some(shared) => shared,
+                None => self.share(posed.bounds_in_own_space(mesh_light)?),
+            };
+            self.own[mesh_light as usize] = Some(shared);
+            return Ok(placed(shared, to_local, brightness));
+        }
+        // A forced light of any other kind has a tree of its own in world space.
+        let shared = self.share(posed.bounds(light.first..light.first + light.count)?);
+        Ok(placed(shared, Similarity::IDENTITY, 1.0))
+    }
+
+    fn share(&mut self, bounds: Vec<LightBounds>) -> u32 {
+        let fingerprint = *hash_bounds(&bounds).finalize().as_bytes();
+        let energy = sum(&bounds);
+        self.shared.push(SharedBounds { bounds, energy, fingerprint });
+        self.shared.len() as u32 - 1
+    }
+}
+
+fn sum(bounds: &[LightBounds]) -> f64 {
+    bounds.iter().map(|b| f64::from(b.energy)).sum()
+}
+
+fn energy_of(placed: &PlacedLight, shared: &[SharedBounds]) -> f64 {
+    shared[placed.shared as usize].energy * f64::from(placed.brightness)
 }
 
 /// Clusters hold the sum of their energies: that of a whole frame must be a number too.
 fn check_total(
     emitters: &Emitters,
-    fixed: &[LightBounds],
-    moving: &[(i32, Vec<LightBounds>)],
+    shared: &[SharedBounds],
+    still: &Group,
+    frames: &[(i32, Group)],
 ) -> Result<(), LightOverflow> {
-    let sum = |bounds: &[LightBounds]| bounds.iter().map(|b| f64::from(b.energy)).sum::<f64>();
-    let most = moving.iter().map(|(_, bounds)| sum(bounds)).fold(0.0, f64::max);
+    let of_placed = |group: &Group| group.placed.iter().map(|p| energy_of(p, shared)).sum::<f64>();
+    let of_group = |group: &Group| sum(&group.flat) + of_placed(group);
+    let most = frames.iter().map(|(_, group)| of_group(group)).fold(0.0, f64::max);
     // Roundings on the way up may add to it.
-    if sum(fixed) + most <= f64::from(f32::MAX) * 0.99 {
+    let largest = f64::from(f32::MAX) * 0.99;
+    if of_group(still) + most <= largest && shared.iter().all(|own| own.energy <= largest) {
         return Ok(());
     }
-    let numbered = |first: u32, bounds: &[LightBounds]| {
-        (first..).zip(bounds.iter().map(|b| b.energy)).collect::<Vec<_>>()
-    };
-    let mut all = numbered(0, fixed);
-    all.extend(moving.iter().flat_map(|(_, bounds)| numbered(fixed.len() as u32, bounds)));
-    let strongest = all.into_iter().max_by(|a, b| a.1.total_cmp(&b.1));
-    let emitter = strongest.map_or(0, |(emitter, _)| emitter);
-    Err(LightOverflow { path: emitters.light_of(emitter).path.clone() })
+    let groups = || std::iter::once(still).chain(frames.iter().map(|(_, group)| group));
+    let flat = groups().flat_map(|group| {
+        (group.first..)
+            .zip(&group.flat)
+            .map(|(emitter, b)| (emitters.get(emitter).light, f64::from(b.energy)))
+    });
+    let placed = groups()
+        .flat_map(|group| group.placed.iter().chain(&group.forced))
+        .map(|p| (p.light, energy_of(p, shared).max(shared[p.shared as usize].energy)));
+    let strongest = flat.chain(placed).max_by(|a, b| a.1.total_cmp(&b.1));
+    let light = strongest.map_or(0, |(light, _)| light);
+    Err(LightOverflow { path: emitters.lights()[light as usize].path.clone() })
 }
 
 fn summaries(
     emitters: &Emitters,
-    fixed: &[LightBounds],
-    moving: &[(i32, Vec<LightBounds>)],
+    shared: &[SharedBounds],
+    still: &Group,
+    frames: &[(i32, Group)],
 ) -> Vec<LightSummary> {
-    let split = emitters.static_count();
-    let summary = |light: &crate::emitter::LightEntry| {
-        let (first, count) = (light.first as usize, light.count as usize);
-        let runs: Vec<&[LightBounds]> = if light.moves {
-            moving.iter().map(|(_, bounds)| &bounds[first - split..][..count]).collect()
-        } else {
-            vec![&fixed[first..][..count]]
+    let placed_of = |group: &Group, row: u32| {
+        let all = [&group.placed, &group.forced];
+        all.into_iter().find_map(|list| {
+            let found = list.binary_search_by_key(&row, |placed| placed.light).ok()?;
+            Some(list[found])
+        })
+    };
+    let summary = |(row, light): (usize, &LightEntry)| {
+        let groups: Vec<&Group> = match light.changes() {
+            true => frames.iter().map(|(_, group)| group).collect(),
+            false => vec![still],
         };
-        let energy = |bounds: &LightBounds| f64::from(bounds.energy);
+        let mut hasher = blake3::Hasher::new();
+        let mut energy = None;
+        for group in groups {
+            let now = match placed_of(group, row as u32) {
+                Some(placed) => {
+                    hasher.update(&shared[placed.shared as usize].fingerprint);
+                    hasher.update(bytemuck::bytes_of(&placed.to_local));
+                    hasher.update(&placed.brightness.to_le_bytes());
+                    energy_of(&placed, shared)
+                }
+                None => {
+                    let own = &group.flat[(light.first - group.first) as usize..];
+                    let own = &own[..light.count as usize];
+                    hasher.update(hash_bounds(own).finalize().as_bytes());
+                    sum(own)
+                }
+            };
+            energy.get_or_insert(now);
+        }
+        let bit = |is: bool, bit: u32| if is { bit } else { 0 };
         LightSummary {
             path: light.path.clone(),
-            fingerprint: fingerprint_of(&runs),
+            fingerprint: *hasher.finalize().as_bytes(),
             emitter_count: light.count,
-            energy: runs.first().map_or(0.0, |run| run.iter().map(energy).sum::<f64>() as f32),
-            moves: light.moves,
+            energy: energy.unwrap_or(0.0).min(f64::from(f32::MAX)) as f32,
+            class: bit(light.forced, LightRow::FORCED)
+                + bit(light.changes(), LightRow::CHANGES)
+                + bit(light.in_own_space || light.forced, LightRow::PLACED),
         }
     };
-    emitters.lights().par_iter().map(summary).collect()
+    emitters.lights().par_iter().enumerate().map(summary).collect()
 }
 
-/// Over every number of the bounds, frame after frame.
-fn fingerprint_of(runs: &[&[LightBounds]]) -> [u8; 32] {
+/// Over every number of some bounds.
+fn hash_bounds(bounds: &[LightBounds]) -> blake3::Hasher {
     let mut hasher = blake3::Hasher::new();
     let mut bytes = Vec::new();
-    for run in runs {
-        bytes.clear();
-        for LightBounds { aabb, cone, energy } in *run {
-            for vector in [aabb.min, aabb.max, cone.axis] {
-                bytes.extend_from_slice(bytemuck::bytes_of(&vector));
-            }
-            bytes.extend_from_slice(bytemuck::bytes_of(&[cone.theta_o, cone.theta_e, *energy]));
-            bytes.push(cone.two_sided.into());
+    for LightBounds { aabb, cone, energy, range_m } in bounds {
+        for vector in [aabb.min, aabb.max, cone.axis] {
+            bytes.extend_from_slice(bytemuck::bytes_of(&vector));
         }
-        hasher.update(&(run.len() as u64).to_le_bytes());
-        hasher.update(&bytes);
+        let numbers = [cone.theta_o, cone.theta_e, *energy, *range_m];
+        bytes.extend_from_slice(bytemuck::bytes_of(&numbers));
+        bytes.push(cone.two_sided.into());
     }
-    *hasher.finalize().as_bytes()
+    hasher.update(&(bounds.len() as u64).to_le_bytes());
+    hasher.update(&bytes);
+    hasher
 }
 
-fn whole(lights: &[LightSummary], moving: &[(i32, Vec<LightBounds>)]) -> [u8; 32] {
+fn whole(lights: &[LightSummary], frames: &[(i32, Group)]) -> [u8; 32] {
     let mut hasher = blake3::Hasher::new();
     hasher.update(&ALGORITHM_VERSION.to_le_bytes());
     for light in lights {
         hasher.update(&(light.path.len() as u64).to_le_bytes());
         hasher.update(light.path.as_bytes());
-        hasher.update(&[light.moves.into()]);
+        hasher.update(&light.class.to_le_bytes());
         hasher.update(&light.fingerprint);
     }
-    for (frame, _) in moving {
+    for (frame, _) in frames {
         hasher.update(&frame.to_le_bytes());
     }
     *hasher.finalize().as_bytes()

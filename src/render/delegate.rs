@@ -2,7 +2,8 @@
 
 use super::buffers::{Pixel, RenderBuffers};
 use super::camera::CameraRays;
-use super::path::{Integrator, PathSample, TraceStats};
+use super::fog::Fog;
+use super::path::{Integrator, PathSample, PathScratch, TraceStats};
 use super::picker::LightPicker;
 use super::rays::RayScene;
 use super::settings::RenderSettings;
@@ -69,6 +70,36 @@ impl<'a, D: AsRef<[u8]> + Sync> RenderDelegate<'a, D> {
         }
     }
 
+    /// Renders with other settings from now on.
+    pub fn set_settings(&mut self, settings: RenderSettings) {
+        self.settings = settings;
+    }
+
+    /// Calls `work` with a frame that is ready to be traced.
+    ///
+    /// # Errors
+    /// If the tree lacks the frame.
+    pub fn at_frame<T>(
+        &self,
+        frame: i32,
+        work: impl FnOnce(&Integrator) -> T,
+    ) -> Result<T, NoSuchFrame> {
+        let pose = self.scene.pose_at(self.scene.timeline.seconds_at(f64::from(frame)));
+        let infinite = infinite_lights(self.scene, &pose);
+        let tree = self.tree.at_frame(frame, &self.static_leaves)?;
+        let (width, height) = (self.settings.width, self.settings.height);
+        Ok(work(&Integrator {
+            settings: &self.settings,
+            tracer: self.geometry.for_pose(self.scene, &pose),
+            surfaces: Surfaces::new(self.scene, &pose),
+            emitters: PosedEmitters { scene: self.scene, emitters: self.emitters, pose: &pose },
+            infinite: &infinite,
+            picker: LightPicker::new(&self.settings, tree, &infinite),
+            camera: CameraRays::new(&self.camera, &pose, width, height),
+            fog: Fog::new(self.scene, &pose, &self.camera),
+        }))
+    }
+
     /// Renders one frame. The picture depends on scene, settings and frame number alone.
     ///
     /// # Errors
@@ -78,19 +109,16 @@ impl<'a, D: AsRef<[u8]> + Sync> RenderDelegate<'a, D> {
         frame: i32,
         progress: &impl Progress,
     ) -> Result<RenderedFrame, NoSuchFrame> {
-        let pose = self.scene.pose_at(self.scene.timeline.seconds_at(f64::from(frame)));
-        let infinite = infinite_lights(self.scene, &pose);
-        let tree = self.tree.at_frame(frame, &self.static_leaves)?;
+        self.at_frame(frame, |integrator| self.render_with(integrator, frame, progress))
+    }
+
+    fn render_with(
+        &self,
+        integrator: &Integrator,
+        frame: i32,
+        progress: &impl Progress,
+    ) -> RenderedFrame {
         let (width, height) = (self.settings.width, self.settings.height);
-        let integrator = Integrator {
-            settings: &self.settings,
-            tracer: self.geometry.for_pose(self.scene, &pose),
-            surfaces: Surfaces::new(self.scene, &pose),
-            emitters: PosedEmitters { scene: self.scene, emitters: self.emitters, pose: &pose },
-            infinite: &infinite,
-            picker: LightPicker::new(self.settings.strategy, tree, self.emitters.len(), &infinite),
-            camera: CameraRays::new(&self.camera, &pose, width, height),
-        };
         let frame_seed = hash(self.settings.seed, frame as u32);
         let mut buffers = RenderBuffers::new(width, height);
         let stats = buffers
@@ -98,20 +126,20 @@ impl<'a, D: AsRef<[u8]> + Sync> RenderDelegate<'a, D> {
             .par_chunks_mut(width as usize)
             .enumerate()
             .map(|(y, row)| {
-                let mut stats = TraceStats::default();
+                let mut scratch = PathScratch::default();
                 for (x, pixel) in row.iter_mut().enumerate() {
                     let seed = hash(frame_seed, y as u32 * width + x as u32);
                     let mut mean = PixelMean::default();
                     for index in 0..self.settings.samples {
-                        mean.add(&integrator.trace(x as u32, y as u32, seed, index, &mut stats));
+                        mean.add(&integrator.trace(x as u32, y as u32, seed, index, &mut scratch));
                     }
                     *pixel = mean.finish();
                 }
                 progress.rows_done(1);
-                stats
+                scratch.stats
             })
             .reduce(TraceStats::default, TraceStats::plus);
-        Ok(RenderedFrame { buffers, stats })
+        RenderedFrame { buffers, stats }
     }
 }
 

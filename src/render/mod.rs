@@ -8,7 +8,8 @@
 //! |---|---|
 //! | [`delegate`] | what is done once for a shot, and what for each frame? |
 //! | [`path`] | how does light get from a lamp to the eye? |
-//! | [`picker`] | which light is sampled at a point, and with what probability? |
+//! | [`direct`], [`fog`] | what do picked lights give a surface, what a stretch of fog? |
+//! | [`picker`] | which lights are sampled there, and how often is each expected to be? |
 //! | [`camera`] | which ray belongs to a point of the picture? |
 //! | [`rays`] | what does a ray hit, and is a light visible? |
 //! | [`surface`] | what is there: normals, textures, material? |
@@ -21,7 +22,9 @@ pub mod bsdf;
 pub mod buffers;
 pub mod camera;
 pub mod delegate;
+pub mod direct;
 pub mod exr;
+pub mod fog;
 pub mod frame_names;
 pub mod frames;
 pub mod path;
@@ -32,4 +35,4 @@ pub mod settings;
 pub mod surface;
 
 pub use delegate::{Progress, RenderDelegate, RenderedFrame};
-pub use settings::{LightStrategy, RenderSettings};
+pub use settings::{LightStrategy, RenderSettings, SplitBy};

@@ -1,19 +1,22 @@
 //! The integrator: paths from the eye, with next-event estimation at every point.
 //!
-//! Light is found in two ways, by picking a light and by reflecting a ray into it, which the power
-//! heuristic weighs against each other (Veach 1997, section 9.2.2). The probability of the pick is
-//! part of the density on both sides: when a ray hits an emitter, the tree is asked how likely it
-//! would have been picked from the point before.
+//! Light is found in two ways, by [picking](super::direct) lights and by reflecting a ray into one,
+//! which the power heuristic weighs against each other (Veach 1997, section 9.2.2). How often a light
+//! is expected to be picked is part of the density on both sides: when a ray hits an emitter, the
+//! tree is asked how often it would have been picked from the point before. Where there is
+//! [fog](super::fog), every stretch of a path also gathers what scatters along it.
 
 use super::bsdf::Bsdf;
 use super::camera::{CameraRay, CameraRays};
-use super::picker::{LightPicker, Target};
+use super::direct::power_heuristic;
+use super::fog::Fog;
+use super::picker::{LightPicker, PickScratch, Wanted};
 use super::rays::{Anchor, Hit, HitSurface, Tracer};
 use super::settings::RenderSettings;
 use super::surface::Surfaces;
 use crate::emitter::{EmitterHit, InfiniteLight, PosedEmitters};
-use crate::light_tree::Receiver;
-use crate::math::color::Rgb;
+use crate::light_tree::{Glossy, Picked, Receiver};
+use crate::math::color::{Rgb, luminance};
 use crate::math::random::{Sampler, hash};
 use glam::{Vec2, Vec3};
 
@@ -36,6 +39,8 @@ pub struct Integrator<'a> {
     pub picker: LightPicker<'a>,
     /// Rays through pixels.
     pub camera: CameraRays,
+    /// What fills the space, if anything does.
+    pub fog: Option<Fog>,
 }
 
 /// What one path saw.
@@ -74,28 +79,30 @@ impl TraceStats {
 
 /// The point a reflected ray came from, for the weight of what it hits.
 struct Origin {
-    receiver: Receiver,
+    wanted: Wanted,
+    point: Vec3,
+    normal: Vec3,
     bsdf_pdf: f32,
 }
 
-/// Light that may arrive at a vertex, if nothing is in its way.
-struct Incoming {
-    /// Unit, from the vertex.
-    direction: Vec3,
-    /// Nits; lux of a facing surface if `pdf` is `None`.
-    radiance: Rgb,
-    /// Density over solid angle, 1/sr; `None` for a direction or point that no ray can hit.
-    pdf: Option<f32>,
-    /// Where it comes from; `None` from infinity.
-    from: Option<Anchor>,
+/// A point on the way, about to be lit.
+pub struct Vertex {
+    /// Where it is.
+    pub anchor: Anchor,
+    /// How it reflects.
+    pub bsdf: Bsdf,
+    /// Towards the point before it, unit, world space.
+    pub wo: Vec3,
+    /// What the tree is asked for.
+    pub receiver: Receiver,
 }
 
-/// A point on the way, about to be lit.
-struct Vertex {
-    anchor: Anchor,
-    bsdf: Bsdf,
-    wo: Vec3,
-    receiver: Receiver,
+/// What a thread needs while it traces, to be used again and again.
+#[derive(Debug, Default)]
+pub struct PathScratch {
+    pub(super) picks: PickScratch,
+    /// What it cost so far.
+    pub stats: TraceStats,
 }
 
 impl Integrator<'_> {
@@ -106,29 +113,34 @@ impl Integrator<'_> {
         y: u32,
         seed: u32,
         index: u32,
-        stats: &mut TraceStats,
+        scratch: &mut PathScratch,
     ) -> PathSample {
         let mut sampler = Sampler::new(seed, index);
         let [px, py, lx, ly] = sampler.next_4d();
         let CameraRay { mut origin, mut direction } =
             self.camera.ray(x, y, Vec2::new(px, py), Vec2::new(lx, ly));
-        let cutout_seed = hash(seed, index);
-        let accept = |instance: u32, triangle: u32, barycentric: Vec2| {
-            let bits = hash(barycentric.x.to_bits(), barycentric.y.to_bits());
-            let random = hash(hash(cutout_seed, bits), hash(instance, triangle)) >> 8;
-            self.surfaces.coverage(instance, triangle, barycentric) > random as f32 / 16_777_216.0
-        };
+        let accept = self.cutouts(hash(seed, index));
         let mut seen = PathSample::default();
         let mut throughput = Rgb::ONE;
         let mut before: Option<Origin> = None;
         for bounce in 0..=self.settings.depth {
-            stats.rays += 1;
+            scratch.stats.rays += 1;
             let hit = self.tracer.closest(origin, direction, f32::INFINITY, &accept);
+            if let Some(fog) = &self.fog {
+                let length = hit.as_ref().map_or(f32::INFINITY, |hit| hit.t);
+                if bounce < self.settings.depth {
+                    let (numbers, salt) = (sampler.next_4d(), hash(seed, !bounce));
+                    let stretch = (origin, direction, length);
+                    let light = self.scattered(fog, stretch, (numbers, salt), &accept, scratch);
+                    seen.radiance += throughput * light;
+                }
+                throughput *= fog.transmittance(origin, direction, length);
+            }
             let Some(hit) = hit else {
-                seen.radiance += throughput * self.emitted_at_infinity(direction, &before);
+                seen.radiance += throughput * self.emitted_at_infinity(direction, &before, scratch);
                 break;
             };
-            seen.radiance += throughput * self.emitted(&hit, direction, &before);
+            seen.radiance += throughput * self.emitted(&hit, direction, &before, scratch);
             let wo = -direction;
             let vertex = self.vertex(&hit, wo);
             if bounce == 0 {
@@ -142,8 +154,10 @@ impl Integrator<'_> {
             }
             let Some(vertex) = vertex.filter(|_| bounce < self.settings.depth) else { break };
 
+            let wanted = self.wanted(&vertex, &mut sampler);
             let [pick, lu, lv, roulette] = sampler.next_4d();
-            let direct = self.direct(&vertex, pick, Vec2::new(lu, lv), &accept, stats);
+            let numbers = (pick, Vec2::new(lu, lv), hash(seed, bounce));
+            let direct = self.direct(&vertex, &wanted, numbers, &accept, scratch);
             seen.radiance += throughput * direct;
 
             let [lobe, bu, bv, _] = sampler.next_4d();
@@ -159,11 +173,46 @@ impl Integrator<'_> {
                 }
                 throughput /= survival;
             }
-            before = Some(Origin { receiver: vertex.receiver, bsdf_pdf: next.pdf });
+            let Receiver { point, normal } = vertex.receiver;
+            before = Some(Origin { wanted, point, normal, bsdf_pdf: next.pdf });
             origin = vertex.anchor.origin_toward(next.wi);
             direction = next.wi;
         }
         seen
+    }
+
+    /// Which hits on cut-outs count, by chance.
+    pub fn cutouts(&self, seed: u32) -> impl Fn(u32, u32, Vec2) -> bool + '_ {
+        move |instance: u32, triangle: u32, barycentric: Vec2| {
+            let bits = hash(barycentric.x.to_bits(), barycentric.y.to_bits());
+            let random = hash(hash(seed, bits), hash(instance, triangle)) >> 8;
+            self.surfaces.coverage(instance, triangle, barycentric) > random as f32 / 16_777_216.0
+        }
+    }
+
+    /// A point that a path from the eye visits: its last but `bounces`, or as far as it gets. `None`
+    /// if it hits nothing that reflects.
+    pub fn probe(&self, x: u32, y: u32, seed: u32, bounces: u32) -> Option<Vertex> {
+        let mut sampler = Sampler::new(seed, 0);
+        let [px, py, lx, ly] = sampler.next_4d();
+        let CameraRay { mut origin, mut direction } =
+            self.camera.ray(x, y, Vec2::new(px, py), Vec2::new(lx, ly));
+        let accept = self.cutouts(seed);
+        let mut last = None;
+        for _ in 0..=bounces {
+            let Some(hit) = self.tracer.closest(origin, direction, f32::INFINITY, &accept) else {
+                break;
+            };
+            let Some(vertex) = self.vertex(&hit, -direction) else { break };
+            let [lobe, bu, bv, _] = sampler.next_4d();
+            let next = vertex.bsdf.sample(vertex.wo, lobe, Vec2::new(bu, bv));
+            let next = next.filter(|next| vertex.lets_through(next.wi));
+            let vertex = last.insert(vertex);
+            let Some(next) = next else { break };
+            origin = vertex.anchor.origin_toward(next.wi);
+            direction = next.wi;
+        }
+        last
     }
 
     /// The point that a hit is; `None` on a sphere light, which reflects nothing.
@@ -176,81 +225,35 @@ impl Integrator<'_> {
         Some(Vertex { anchor: hit.anchor, bsdf: surface.bsdf(), wo, receiver })
     }
 
-    /// Light from one picked light.
-    fn direct(
-        &self,
-        vertex: &Vertex,
-        u_pick: f32,
-        u: Vec2,
-        accept: &impl Fn(u32, u32, Vec2) -> bool,
-        stats: &mut TraceStats,
-    ) -> Rgb {
-        stats.light_picks += 1;
-        let Some(pick) = self.picker.pick(&vertex.receiver, u_pick) else { return Rgb::ZERO };
-        let sample = match pick.target {
-            Target::Emitter(emitter) => self.sample_emitter(emitter, vertex, u),
-            Target::Infinite(row) => {
-                let found = self.infinite[row as usize].sample(vertex.receiver.normal, u);
-                found.map(|s| Incoming {
-                    direction: s.direction,
-                    radiance: s.radiance,
-                    pdf: s.pdf,
-                    from: None,
-                })
-            }
-        };
-        let Some(Incoming { direction, radiance, pdf, from }) = sample else { return Rgb::ZERO };
-        if !vertex.lets_through(direction) {
-            return Rgb::ZERO;
-        }
-        let (reflected, bsdf_pdf) = vertex.bsdf.eval(vertex.wo, direction);
-        if reflected == Rgb::ZERO {
-            return Rgb::ZERO;
-        }
-        stats.rays += 1;
-        let blocked = match from {
-            Some(light) => self.tracer.occluded_between(&vertex.anchor, &light, accept),
-            None => {
-                let origin = vertex.anchor.origin_toward(direction);
-                self.tracer.occluded(origin, direction, f32::INFINITY, accept)
-            }
-        };
-        if blocked {
-            return Rgb::ZERO;
-        }
-        let chance = pick.probability as f32;
-        match pdf {
-            None => reflected * radiance / chance,
-            Some(pdf) => {
-                let density = chance * pdf;
-                let weight =
-                    if self.settings.mis { power_heuristic(density, bsdf_pdf) } else { 1.0 };
-                reflected * radiance * (weight / density)
-            }
+    /// What lights are picked for at a vertex.
+    fn wanted(&self, vertex: &Vertex, sampler: &mut Sampler) -> Wanted {
+        match self.picker.asks_for_lobe() {
+            true => self.glossy(vertex, sampler),
+            false => Wanted::At(vertex.receiver),
         }
     }
 
-    /// Light from a point of an emitter.
-    fn sample_emitter(&self, emitter: u32, vertex: &Vertex, u: Vec2) -> Option<Incoming> {
-        let s = self.emitters.sample(emitter, vertex.receiver.point, u)?;
-        let coverage = s.on_mesh.map_or(1.0, |place| {
-            self.surfaces.coverage(place.instance, place.triangle, place.barycentric)
-        });
-        let from = if s.normal == Vec3::ZERO {
-            Anchor::free(s.point)
-        } else {
-            Anchor::computed(s.point, s.normal, s.magnitude_m)
-        };
-        Some(Incoming {
-            direction: s.direction,
-            radiance: s.radiance * coverage,
-            pdf: s.pdf,
-            from: Some(from),
-        })
+    /// The same with a direction that the surface reflects to.
+    pub fn glossy(&self, vertex: &Vertex, sampler: &mut Sampler) -> Wanted {
+        let receiver = vertex.receiver;
+        // A direction of its own: the one that the path goes on in may hit a light, and then its
+        // weight must not depend on it.
+        let [lobe, u, v, _] = sampler.next_4d();
+        let toward = vertex.bsdf.sample(vertex.wo, lobe, Vec2::new(u, v));
+        let toward = toward.map_or(receiver.normal, |sample| sample.wi);
+        let (specular, diffuse) = vertex.bsdf.albedo(vertex.wo);
+        let specular = luminance(specular) / luminance(specular + diffuse).max(f32::MIN_POSITIVE);
+        Wanted::Glossy(Glossy { receiver, toward, alpha: vertex.bsdf.alpha(), specular })
     }
 
     /// Light that a ray finds where it ends, weighed against having picked it.
-    fn emitted(&self, hit: &Hit, direction: Vec3, before: &Option<Origin>) -> Rgb {
+    fn emitted(
+        &self,
+        hit: &Hit,
+        direction: Vec3,
+        before: &Option<Origin>,
+        scratch: &mut PathScratch,
+    ) -> Rgb {
         let emitter = match hit.surface {
             HitSurface::Triangle { instance, triangle, .. } => {
                 self.emitters.emitters.of_triangle(instance, triangle)
@@ -275,13 +278,18 @@ impl Integrator<'_> {
         }
         let Some(before) = before else { return radiance };
         radiance
-            * self.weight_of_hit(before, Target::Emitter(emitter), || {
-                self.emitters.pdf(&at, before.receiver.point)
+            * self.weight_of_hit(before, Picked::Emitter(emitter), scratch, || {
+                self.emitters.pdf(&at, before.point)
             })
     }
 
     /// Light from infinity along a ray, weighed likewise.
-    fn emitted_at_infinity(&self, direction: Vec3, before: &Option<Origin>) -> Rgb {
+    fn emitted_at_infinity(
+        &self,
+        direction: Vec3,
+        before: &Option<Origin>,
+        scratch: &mut PathScratch,
+    ) -> Rgb {
         let mut sum = Rgb::ZERO;
         for (row, light) in self.infinite.iter().enumerate() {
             let radiance = light.radiance(direction);
@@ -289,8 +297,8 @@ impl Integrator<'_> {
                 continue;
             }
             let weight = before.as_ref().map_or(1.0, |before| {
-                self.weight_of_hit(before, Target::Infinite(row as u32), || {
-                    light.pdf(before.receiver.normal, direction)
+                self.weight_of_hit(before, Picked::Beside(row as u32), scratch, || {
+                    light.pdf(before.normal, direction)
                 })
             });
             sum += radiance * weight;
@@ -299,29 +307,25 @@ impl Integrator<'_> {
     }
 
     /// The weight of a reflected ray that hit a light, against picking and sampling that light.
-    fn weight_of_hit(&self, before: &Origin, target: Target, pdf: impl FnOnce() -> f32) -> f32 {
+    fn weight_of_hit(
+        &self,
+        before: &Origin,
+        light: Picked,
+        scratch: &mut PathScratch,
+        pdf: impl FnOnce() -> f32,
+    ) -> f32 {
         if !self.settings.mis {
             return 0.0;
         }
-        let chance = self.picker.probability(&before.receiver, target) as f32;
-        power_heuristic(before.bsdf_pdf, chance * pdf())
+        let expected = self.picker.expected(&before.wanted, light, &mut scratch.picks) as f32;
+        power_heuristic(before.bsdf_pdf, expected * pdf())
     }
 }
 
 impl Vertex {
     /// Whether the surface itself, not only its shading normal, lets light pass between `wo` and a
     /// direction without going through it.
-    fn lets_through(&self, wi: Vec3) -> bool {
+    pub fn lets_through(&self, wi: Vec3) -> bool {
         self.anchor.normal.dot(wi) * self.anchor.normal.dot(self.wo) > 0.0
-    }
-}
-
-/// Veach's power heuristic with exponent 2, safe where squares would overflow.
-fn power_heuristic(own: f32, other: f32) -> f32 {
-    if own > 0.0 {
-        let ratio = other / own;
-        1.0 / (1.0 + ratio * ratio)
-    } else {
-        0.0
     }
 }

@@ -1,37 +1,93 @@
-//! Which light to sample at a receiver: the strategies, side by side.
+//! Which lights to sample for a viewer: the strategies, side by side.
 //!
-//! All answer the same two questions, pick one and tell the probability of a given one, so the
-//! integrator cannot tell them apart and a picture has the same mean under each.
+//! All answer the same two questions, pick some and tell how often a given one is expected to be
+//! picked, so the integrator cannot tell them apart and a picture has the same mean under each.
+//! Forced lights are no part of the question: each is sampled always.
 
-use super::settings::LightStrategy;
+use super::settings::{LightStrategy, RenderSettings};
 use crate::emitter::InfiniteLight;
-use crate::light_tree::{FrameTree, Receiver};
-use crate::math::random::widen;
-
-/// A light that can be sampled.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Target {
-    /// An emitter of the tree, by number.
-    Emitter(u32),
-    /// A light at infinity, by row.
-    Infinite(u32),
-}
+use crate::light_tree::{
+    DistanceOnly, FrameTree, Glossy, Moments, Pick, Picked, Receiver, Scratch, Segment, SplitTest,
+    Splitting, Viewer,
+};
+use crate::math::random::{hash, widen};
+use glam::Vec3;
 
 /// A light, picked.
 #[derive(Clone, Copy, Debug)]
 pub struct LightPick {
-    /// Which.
-    pub target: Target,
-    /// With what probability; positive.
+    /// An emitter by number, or a light at infinity by row.
+    pub light: Picked,
+    /// What its contribution is divided by; positive.
     pub probability: f64,
+    /// How often it is expected to be picked: what it is weighed with; positive.
+    pub expected: f64,
+}
+
+/// What light is wanted for.
+#[derive(Clone, Copy, Debug)]
+pub enum Wanted {
+    /// A point of a surface.
+    At(Receiver),
+    /// The same, and where it reflects to.
+    Glossy(Glossy),
+    /// A stretch of a ray in a medium, with the length over which it transmits light.
+    Along(Segment, f32),
+}
+
+/// Room for picking, to be used again and again.
+#[derive(Debug, Default)]
+pub struct PickScratch {
+    beside: Vec<f64>,
+    tree: TreeScratch,
+}
+
+#[derive(Debug, Default)]
+struct TreeScratch {
+    at: Scratch<Receiver>,
+    glossy: Scratch<Glossy>,
+    along: Scratch<Segment>,
+    distance_at: Scratch<DistanceOnly<Receiver>>,
+    distance_along: Scratch<DistanceOnly<Segment>>,
+}
+
+/// Evaluates an expression with the viewer that something is wanted for, and its room in the scratch.
+macro_rules! with_viewer {
+    ($picker:expr, $wanted:expr, $scratch:expr, |$viewer:ident, $room:ident| $body:expr) => {{
+        let scratch: &mut TreeScratch = $scratch;
+        let by_distance = $picker.strategy == LightStrategy::Distance;
+        match *$wanted {
+            Wanted::At(receiver) | Wanted::Glossy(Glossy { receiver, .. }) if by_distance => {
+                let receiver = Receiver { normal: Vec3::ZERO, ..receiver };
+                let ($viewer, $room) = (&DistanceOnly(receiver), &mut scratch.distance_at);
+                $body
+            }
+            Wanted::Along(segment, _) if by_distance => {
+                let ($viewer, $room) = (&DistanceOnly(segment), &mut scratch.distance_along);
+                $body
+            }
+            Wanted::At(ref receiver) => {
+                let ($viewer, $room) = (receiver, &mut scratch.at);
+                $body
+            }
+            Wanted::Glossy(ref glossy) => {
+                let ($viewer, $room) = (glossy, &mut scratch.glossy);
+                $body
+            }
+            Wanted::Along(ref segment, _) => {
+                let ($viewer, $room) = (segment, &mut scratch.along);
+                $body
+            }
+        }
+    }};
 }
 
 /// Picks lights for one frame.
 pub struct LightPicker<'a> {
     strategy: LightStrategy,
+    splitting: Splitting,
     tree: FrameTree<'a>,
     infinite: &'a [InfiniteLight<'a>],
-    emitter_count: usize,
     /// Running sums of energy over emitters, then lights at infinity; only for the power strategy.
     running_power: Vec<f64>,
 }
@@ -39,188 +95,259 @@ pub struct LightPicker<'a> {
 impl<'a> LightPicker<'a> {
     /// A picker over the tree's emitters and the lights at infinity.
     pub fn new(
-        strategy: LightStrategy,
+        settings: &RenderSettings,
         tree: FrameTree<'a>,
-        emitter_count: usize,
         infinite: &'a [InfiniteLight<'a>],
     ) -> LightPicker<'a> {
-        let running_power = if strategy == LightStrategy::Power {
-            running_power(&tree, emitter_count, infinite)
+        let strategy = settings.strategy;
+        let by_power = strategy == LightStrategy::Power;
+        let running_power = if by_power { running_power(&tree, infinite) } else { Vec::new() };
+        LightPicker { strategy, splitting: settings.splitting(), tree, infinite, running_power }
+    }
+
+    /// The tree that is picked from.
+    pub fn tree(&self) -> &FrameTree<'a> {
+        &self.tree
+    }
+
+    /// Whether more than one light may be picked at a point, so that each needs numbers of its own.
+    pub fn takes_several(&self) -> bool {
+        !self.splitting.is_off()
+            || self.strategy == LightStrategy::All
+            || self.tree.forced_count() > 0
+            || self.infinite.iter().any(|light| light.forced)
+    }
+
+    /// Whether the test of splitting asks where a surface reflects to.
+    pub fn asks_for_lobe(&self) -> bool {
+        !self.splitting.is_off() && self.splitting.test == SplitTest::SolidAngle
+    }
+
+    /// Calls `visit` with every light that is picked with a random number in `[0, 1)`. `salt` stands
+    /// for the place.
+    pub fn pick(
+        &self,
+        wanted: &Wanted,
+        u: f32,
+        salt: u32,
+        scratch: &mut PickScratch,
+        mut visit: impl FnMut(LightPick),
+    ) {
+        let u = widen(u, salt);
+        self.pick_forced(wanted, u, salt, &mut visit);
+        match self.strategy {
+            LightStrategy::Uniform | LightStrategy::Power => self.pick_blindly(u, visit),
+            LightStrategy::All => {
+                let one = |light| LightPick { light, probability: 1.0, expected: 1.0 };
+                (0..self.count()).for_each(|at| visit(one(self.light(at))));
+            }
+            LightStrategy::Exhaustive => self.pick_exhaustively(wanted, u, visit),
+            LightStrategy::Tree | LightStrategy::Distance => {
+                let PickScratch { beside, tree } = scratch;
+                self.weigh_infinite(wanted, beside);
+                with_viewer!(self, wanted, tree, |viewer, room| {
+                    self.pick_from_tree(viewer, beside, (u, salt), room, visit)
+                });
+            }
+        }
+    }
+
+    /// How often [`pick`](Self::pick) is expected to pick a light.
+    pub fn expected(&self, wanted: &Wanted, light: Picked, scratch: &mut PickScratch) -> f64 {
+        match light {
+            Picked::Beside(row) if self.infinite[row as usize].forced => return 1.0,
+            Picked::Emitter(emitter) if emitter >= self.tree.unforced_count() => {
+                return with_viewer!(self, wanted, &mut scratch.tree, |viewer, _room| {
+                    self.tree.probability(viewer, emitter)
+                });
+            }
+            _ => {}
+        }
+        match self.strategy {
+            LightStrategy::All => 1.0,
+            LightStrategy::Uniform | LightStrategy::Power => self.blind_probability(light),
+            LightStrategy::Exhaustive => self.exhaustive_probability(wanted, light),
+            LightStrategy::Tree | LightStrategy::Distance => {
+                let PickScratch { beside, tree } = scratch;
+                self.weigh_infinite(wanted, beside);
+                with_viewer!(self, wanted, tree, |viewer, room| {
+                    self.tree.expected(viewer, beside, &self.splitting, light, room)
+                })
+            }
+        }
+    }
+
+    /// The exact moments of an estimate by the tree, given what each light contributes.
+    pub fn moments(&self, wanted: &Wanted, contribution: &impl Fn(Picked, f64) -> f64) -> Moments {
+        let PickScratch { mut beside, mut tree } = PickScratch::default();
+        self.weigh_infinite(wanted, &mut beside);
+        with_viewer!(self, wanted, &mut tree, |viewer, _room| {
+            self.tree.moments(viewer, &beside, &self.splitting, contribution)
+        })
+    }
+
+    fn pick_from_tree<V: Viewer>(
+        &self,
+        viewer: &V,
+        beside: &[f64],
+        (u, salt): (f64, u32),
+        scratch: &mut Scratch<V>,
+        mut visit: impl FnMut(LightPick),
+    ) {
+        let mut visit = |pick: Pick| {
+            let (probability, expected) = (pick.probability, pick.expected);
+            visit(LightPick { light: pick.light, probability, expected });
+        };
+        if self.splitting.is_off() && beside.is_empty() {
+            self.tree.sample(viewer, u).into_iter().for_each(visit);
         } else {
-            Vec::new()
+            self.tree.for_each_pick(
+                viewer,
+                beside,
+                &self.splitting,
+                (u, salt),
+                scratch,
+                &mut visit,
+            );
+        }
+    }
+
+    fn pick_forced(&self, wanted: &Wanted, u: f64, salt: u32, visit: &mut impl FnMut(LightPick)) {
+        for light in 0..self.tree.forced_count() {
+            let turned = u + f64::from(hash(salt, !(light as u32))) / 4_294_967_296.0;
+            let u = if turned >= 1.0 { turned - 1.0 } else { turned };
+            let pick = with_viewer!(self, wanted, &mut TreeScratch::default(), |viewer, _room| {
+                self.tree.sample_forced(light, viewer, u)
+            });
+            if let Some(pick) = pick {
+                let probability = pick.probability;
+                visit(LightPick { light: pick.light, probability, expected: probability });
+            }
+        }
+        for (row, _) in (0..).zip(self.infinite).filter(|(_, light)| light.forced) {
+            visit(LightPick { light: Picked::Beside(row), probability: 1.0, expected: 1.0 });
+        }
+    }
+
+    /// How many lights there are to pick from without looking.
+    pub fn count(&self) -> u32 {
+        self.tree.unforced_count()
+            + self.infinite.iter().filter(|light| !light.forced).count() as u32
+    }
+
+    /// The lights to pick from, by number: emitters, then those at infinity.
+    fn light(&self, at: u32) -> Picked {
+        match at.checked_sub(self.tree.unforced_count()) {
+            None => Picked::Emitter(at),
+            Some(at) => {
+                let mut unforced = (0..).zip(self.infinite).filter(|(_, light)| !light.forced);
+                Picked::Beside(unforced.nth(at as usize).map_or(0, |(row, _)| row))
+            }
+        }
+    }
+
+    /// The same for every viewer.
+    fn pick_blindly(&self, u: f64, mut visit: impl FnMut(LightPick)) {
+        let Some(last) = self.count().checked_sub(1) else { return };
+        let at = match self.running_power.last() {
+            Some(total) => self.running_power.partition_point(|&end| end <= u * total) as u32,
+            None => (u * f64::from(self.count())) as u32,
         };
-        LightPicker { strategy, tree, infinite, emitter_count, running_power }
-    }
-
-    /// Picks a light with a random number in `[0, 1)`; `None` where no light can arrive.
-    pub fn pick(&self, receiver: &Receiver, u: f32) -> Option<LightPick> {
-        let u = widen(u, receiver.point.x.to_bits() ^ receiver.point.z.to_bits());
-        match self.strategy {
-            LightStrategy::Uniform => {
-                let count = self.emitter_count + self.infinite.len();
-                let at = ((u * count as f64) as usize).min(count.checked_sub(1)?);
-                Some(LightPick { target: self.target(at), probability: 1.0 / count as f64 })
-            }
-            LightStrategy::Power => {
-                let total = *self.running_power.last()?;
-                let at = self.running_power.partition_point(|&end| end <= u * total);
-                let target = self.target(at.min(self.running_power.len() - 1));
-                let probability = self.probability(receiver, target);
-                (probability > 0.0).then_some(LightPick { target, probability })
-            }
-            LightStrategy::Tree => self.pick_infinite_or(
-                receiver,
-                u,
-                || self.tree.total_importance(receiver),
-                |u| {
-                    let pick = self.tree.sample(receiver, u)?;
-                    let target = Target::Emitter(pick.emitter);
-                    Some(LightPick { target, probability: pick.probability })
-                },
-            ),
-            LightStrategy::Exhaustive => {
-                let total = self.sum_of_importances(receiver);
-                self.pick_infinite_or(
-                    receiver,
-                    u,
-                    || total,
-                    |u| {
-                        let mut left = u * total;
-                        let mut picked = None;
-                        self.tree.for_each_leaf(|emitter, node| {
-                            let importance = node.importance(receiver);
-                            if importance > 0.0 && left >= 0.0 {
-                                picked = Some((emitter, importance));
-                                left -= importance;
-                            }
-                        });
-                        let (emitter, importance) = picked?;
-                        let probability = importance / total;
-                        Some(LightPick { target: Target::Emitter(emitter), probability })
-                    },
-                )
-            }
+        let light = self.light(at.min(last));
+        let probability = self.blind_probability(light);
+        if probability > 0.0 {
+            visit(LightPick { light, probability, expected: probability });
         }
     }
 
-    /// The probability with which [`pick`](Self::pick) picks a light for a receiver.
-    pub fn probability(&self, receiver: &Receiver, target: Target) -> f64 {
-        let index = match target {
-            Target::Emitter(emitter) => emitter as usize,
-            Target::Infinite(row) => self.emitter_count + row as usize,
+    /// The probability of a light where all viewers are alike: by power or uniformly.
+    pub fn blind_probability(&self, light: Picked) -> f64 {
+        match self.running_power.is_empty() {
+            true => 1.0 / f64::from(self.count()),
+            false => self.share_of_power(light),
+        }
+    }
+
+    fn share_of_power(&self, light: Picked) -> f64 {
+        let index = match light {
+            Picked::Emitter(emitter) => emitter as usize,
+            Picked::Beside(row) => {
+                let unforced = self.infinite[..row as usize].iter().filter(|light| !light.forced);
+                self.tree.unforced_count() as usize + unforced.count()
+            }
         };
-        match self.strategy {
-            LightStrategy::Uniform => 1.0 / (self.emitter_count + self.infinite.len()) as f64,
-            LightStrategy::Power => {
-                let before = if index == 0 { 0.0 } else { self.running_power[index - 1] };
-                let total = self.running_power.last().copied().unwrap_or(0.0);
-                if total > 0.0 { (self.running_power[index] - before) / total } else { 0.0 }
+        let before = if index == 0 { 0.0 } else { self.running_power[index - 1] };
+        let total = self.running_power.last().copied().unwrap_or(0.0);
+        if total > 0.0 { (self.running_power[index] - before) / total } else { 0.0 }
+    }
+
+    fn pick_exhaustively(&self, wanted: &Wanted, u: f64, mut visit: impl FnMut(LightPick)) {
+        let mut total = 0.0;
+        self.for_each_importance(wanted, |_, importance| total += importance);
+        let (mut left, mut picked) = (u * total, None);
+        self.for_each_importance(wanted, |light, importance| {
+            if importance > 0.0 && left >= 0.0 {
+                picked = Some((light, importance));
+                left -= importance;
             }
-            LightStrategy::Tree => self.share(
-                receiver,
-                target,
-                || self.tree.total_importance(receiver),
-                |emitter| self.tree.probability(receiver, emitter),
-            ),
-            LightStrategy::Exhaustive => {
-                let total = self.sum_of_importances(receiver);
-                self.share(
-                    receiver,
-                    target,
-                    || total,
-                    |wanted| {
-                        let mut found = 0.0;
-                        self.tree.for_each_leaf(|emitter, node| {
-                            if emitter == wanted {
-                                found = node.importance(receiver) / total;
-                            }
-                        });
-                        found
-                    },
-                )
-            }
+        });
+        if let Some((light, importance)) = picked {
+            let probability = importance / total;
+            visit(LightPick { light, probability, expected: probability });
         }
     }
 
-    fn target(&self, at: usize) -> Target {
-        match at.checked_sub(self.emitter_count) {
-            Some(row) => Target::Infinite(row as u32),
-            None => Target::Emitter(at as u32),
+    fn exhaustive_probability(&self, wanted: &Wanted, light: Picked) -> f64 {
+        let (mut total, mut found) = (0.0, 0.0);
+        self.for_each_importance(wanted, |other, importance| {
+            total += importance;
+            found = if other == light { importance } else { found };
+        });
+        if found > 0.0 { found / total } else { 0.0 }
+    }
+
+    /// Calls `visit` with the importance of every light that is not forced.
+    pub fn for_each_importance(&self, wanted: &Wanted, mut visit: impl FnMut(Picked, f64)) {
+        with_viewer!(self, wanted, &mut TreeScratch::default(), |viewer, _room| {
+            self.tree.for_each_leaf(viewer, |emitter, importance, _| {
+                visit(Picked::Emitter(emitter), importance);
+            })
+        });
+        for (row, light) in (0..).zip(self.infinite).filter(|(_, light)| !light.forced) {
+            visit(Picked::Beside(row), importance_of(light, wanted));
         }
     }
 
-    /// Lights at infinity compete with the tree's root, each by its estimated irradiance.
-    fn pick_infinite_or(
-        &self,
-        receiver: &Receiver,
-        u: f64,
-        of_tree: impl FnOnce() -> f64,
-        pick_in_tree: impl FnOnce(f64) -> Option<LightPick>,
-    ) -> Option<LightPick> {
-        if self.infinite.is_empty() {
-            return pick_in_tree(u);
-        }
-        let of_tree = of_tree();
-        let total = of_tree + self.infinite_importance(receiver);
-        let mut left = u * total;
-        for (row, light) in self.infinite.iter().enumerate() {
-            let importance = light.importance(receiver.normal);
-            if left < importance {
-                let target = Target::Infinite(row as u32);
-                return Some(LightPick { target, probability: importance / total });
-            }
-            left -= importance;
-        }
-        if of_tree <= 0.0 {
-            return None;
-        }
-        let rest = (left / of_tree).clamp(0.0, 1.0 - f64::EPSILON / 2.0);
-        let pick = pick_in_tree(rest)?;
-        Some(LightPick { probability: pick.probability * of_tree / total, ..pick })
+    /// The importances of the lights at infinity, in the unit of the tree's.
+    fn weigh_infinite(&self, wanted: &Wanted, importances: &mut Vec<f64>) {
+        importances.clear();
+        importances.extend(self.infinite.iter().map(|light| match light.forced {
+            true => 0.0,
+            false => importance_of(light, wanted),
+        }));
     }
+}
 
-    /// The probability that belongs to [`pick_infinite_or`](Self::pick_infinite_or).
-    fn share(
-        &self,
-        receiver: &Receiver,
-        target: Target,
-        of_tree: impl FnOnce() -> f64,
-        in_tree: impl FnOnce(u32) -> f64,
-    ) -> f64 {
-        let chance = |part: f64, whole: f64| if part > 0.0 { part / whole } else { 0.0 };
-        match target {
-            Target::Emitter(emitter) if self.infinite.is_empty() => in_tree(emitter),
-            Target::Emitter(emitter) => {
-                let of_tree = of_tree();
-                let total = of_tree + self.infinite_importance(receiver);
-                in_tree(emitter) * chance(of_tree, total)
-            }
-            Target::Infinite(row) => {
-                let importance = self.infinite[row as usize].importance(receiver.normal);
-                chance(importance, of_tree() + self.infinite_importance(receiver))
-            }
+/// An estimate of the irradiance, lux; along a segment integrated over the length that transmits.
+fn importance_of(light: &InfiniteLight, wanted: &Wanted) -> f64 {
+    match wanted {
+        Wanted::At(receiver) | Wanted::Glossy(Glossy { receiver, .. }) => {
+            light.importance(receiver.normal)
         }
-    }
-
-    fn infinite_importance(&self, receiver: &Receiver) -> f64 {
-        self.infinite.iter().map(|light| light.importance(receiver.normal)).sum()
-    }
-
-    fn sum_of_importances(&self, receiver: &Receiver) -> f64 {
-        let mut sum = 0.0;
-        self.tree.for_each_leaf(|_, node| sum += node.importance(receiver));
-        sum
+        Wanted::Along(_, length) => light.importance(Vec3::ZERO) * f64::from(*length),
     }
 }
 
 /// Energies in the emitters' order, then those of the lights at infinity, summed up. A light at
 /// infinity counts as the point light that gives its irradiance at the tree's radius.
-fn running_power(tree: &FrameTree, emitters: usize, infinite: &[InfiniteLight]) -> Vec<f64> {
-    let mut power = vec![0.0; emitters];
-    tree.for_each_leaf(|emitter, node| power[emitter as usize] = f64::from(node.energy()));
+fn running_power(tree: &FrameTree, infinite: &[InfiniteLight]) -> Vec<f64> {
+    let mut power = vec![0.0; tree.unforced_count() as usize];
+    let anywhere = Receiver { point: Vec3::ZERO, normal: Vec3::ZERO };
+    tree.for_each_leaf(&anywhere, |emitter, _, energy| power[emitter as usize] = energy);
     let radius2 = tree.root().map_or(1.0, |root| f64::from(root.half_extent().length_squared()));
     let radius2 = if radius2 > 0.0 { radius2 } else { 1.0 };
-    power.extend(infinite.iter().map(|light| light.importance(glam::Vec3::ZERO) * radius2));
+    let unforced = infinite.iter().filter(|light| !light.forced);
+    power.extend(unforced.map(|light| light.importance(Vec3::ZERO) * radius2));
     let mut sum = 0.0;
     for entry in &mut power {
         sum += *entry;

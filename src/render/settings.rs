@@ -1,20 +1,43 @@
 //! Render settings: the knobs of a render.
 
-use serde::Serialize;
+use crate::light_tree::{SplitTest, Splitting};
+use serde::{Deserialize, Serialize};
 
 /// How a light is picked.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum LightStrategy {
     /// Every light alike.
     Uniform,
     /// By energy alone, the same everywhere.
     Power,
+    /// Through the light tree, by energy and distance alone: without any orientation.
+    Distance,
     /// By importance, through the light tree.
     #[default]
     Tree,
     /// By the importance of every single emitter: what a perfect traversal would do. Slow.
     Exhaustive,
+    /// None is picked: every light is sampled at every point, the traditional loop. Slow.
+    All,
+}
+
+impl LightStrategy {
+    /// Whether it walks the tree, so that clusters can be split.
+    pub fn splits(self) -> bool {
+        matches!(self, LightStrategy::Distance | LightStrategy::Tree)
+    }
+}
+
+/// What makes a cluster worth splitting; see [`SplitTest`].
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum SplitBy {
+    /// Its part in the relative variance of one sample.
+    #[default]
+    Variance,
+    /// The seed's: its solid angle times the peak of the BSDF. All clusters left are sampled.
+    SolidAngle,
 }
 
 /// The knobs of a render. Together with scene, tree and frame they decide every pixel.
@@ -32,6 +55,13 @@ pub struct RenderSettings {
     pub seed: u32,
     /// How a light is picked.
     pub strategy: LightStrategy,
+    /// How readily clusters are split, `[0, 1]`: 0 samples one light at a point, 1 every one. For the
+    /// strategies that [split](LightStrategy::splits).
+    pub split: f32,
+    /// At most so many lights are sampled at a point, beside the forced ones.
+    pub max_lights: u32,
+    /// What makes a cluster worth splitting.
+    pub split_by: SplitBy,
     /// Weigh picked lights and lights that reflected rays hit against each other. Without, lights
     /// are found by picking alone.
     pub mis: bool,
@@ -46,7 +76,24 @@ impl Default for RenderSettings {
             depth: 5,
             seed: 0,
             strategy: LightStrategy::default(),
+            split: 0.5,
+            max_lights: 64,
+            split_by: SplitBy::default(),
             mis: true,
+        }
+    }
+}
+
+impl RenderSettings {
+    /// How the tree is to be split.
+    pub fn splitting(&self) -> Splitting {
+        Splitting {
+            knob: if self.strategy.splits() { self.split } else { 0.0 },
+            most: self.max_lights.max(1),
+            test: match self.split_by {
+                SplitBy::Variance => SplitTest::Variance,
+                SplitBy::SolidAngle => SplitTest::SolidAngle,
+            },
         }
     }
 }

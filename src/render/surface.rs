@@ -1,13 +1,11 @@
 //! From a hit to a shading point: normals, textures, material.
 //!
 //! [`Surfaces`] answers for one frame. It evaluates a [`Material`] (factors times textures times
-//! vertex colour) and the mesh's attributes at a point of a triangle; it does not trace, and it
-//! does not know the emission profile of an instance (`Instance::shaping`), which the light that
-//! the mesh is applies.
+//! vertex colour) and the mesh's attributes at a point of a triangle; it does not trace, and what a
+//! surface emits is not its affair but that of the light that the mesh is.
 //!
 //! Sides. The geometric normal of a hit is the front's. Reflection is two-sided, so the shading
-//! frame is turned to the side that `wo` is on; emission leaves the front, and the back too if the
-//! material is double-sided. Normals of a file that point against the winding are turned, missing
+//! frame is turned to the side that `wo` is on. Normals of a file that point against the winding are turned, missing
 //! ones are the triangle's own, and one that a normal map or interpolation bends away from `wo`
 //! is bent back until `wo` is above its horizon.
 
@@ -41,9 +39,6 @@ pub struct Surface {
     pub frame: Frame,
     /// The material here.
     pub sample: SurfaceSample,
-    /// Luminance that leaves toward `wo`, nits, before the instance's shaping; 0 on a side that
-    /// does not emit.
-    pub emission_nits: Rgb,
 }
 
 impl Surface {
@@ -98,14 +93,8 @@ impl<'a> Surfaces<'a> {
         let to_world = Mat3::from(self.pose.world(node).matrix3);
         let normal = self.shading_normal(&at, material, to_world, anchor.normal);
         let normal = toward(if front { normal } else { -normal }, wo);
-        let emits = front || material.double_sided;
-        let emission_nits = if emits && material.emits() {
-            material.emission_nits * self.lookup(&at, &material.emission_texture).truncate()
-        } else {
-            Rgb::ZERO
-        };
         let frame = Frame::around(normal);
-        Surface { anchor, front, frame, sample: self.evaluate(&at, material), emission_nits }
+        Surface { anchor, front, frame, sample: self.evaluate(&at, material) }
     }
 
     fn locate(&self, instance: u32, triangle: u32, barycentric: Vec2) -> (At<'a>, &Material) {

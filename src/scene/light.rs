@@ -64,6 +64,11 @@ pub enum LightKind {
 }
 
 impl LightKind {
+    /// Whether it is at infinity and not at its node.
+    pub fn is_infinite(&self) -> bool {
+        matches!(self, LightKind::Distant { .. } | LightKind::Dome { .. })
+    }
+
     /// Its strength, in its own unit: candela of a point or a spot, nits of a sphere or a dome, lux
     /// of a sun.
     pub fn rgb(&self) -> Rgb {

@@ -82,6 +82,12 @@ impl Scene {
         pose::moving(&self.nodes)
     }
 
+    /// For each node, whether it keeps shapes and sizes however it moves: neither it nor an ancestor
+    /// scales unevenly, or with time.
+    pub fn rigid_nodes(&self) -> Vec<bool> {
+        pose::rigid(&self.nodes)
+    }
+
     /// The material of a mesh, if it has one of its own.
     pub fn material_of(&self, mesh: u32) -> Option<&Material> {
         self.meshes[mesh as usize].material.map(|material| &self.materials[material as usize])

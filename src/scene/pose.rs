@@ -150,7 +150,44 @@ pub(super) fn moving(nodes: &[Node]) -> Vec<bool> {
     moves
 }
 
+/// Which nodes never change what is below them but by a similarity of one scale.
+pub(super) fn rigid(nodes: &[Node]) -> Vec<bool> {
+    let mut rigid: Vec<bool> = Vec::with_capacity(nodes.len());
+    for node in nodes {
+        let above = node.parent.is_none_or(|parent| rigid[parent as usize]);
+        let keeps_size = !node.channels.iter().any(|c| matches!(c, Channel::Scale(_)));
+        rigid.push(above && keeps_size && node.scales_evenly(RIGID_TOLERANCE));
+    }
+    rigid
+}
+
+/// How far a scale may be from uniform for a shape to be kept, to the last bits.
+const RIGID_TOLERANCE: f64 = 1e-6;
+
 impl Node {
+    /// Whether the node's own transform keeps shapes at every time, up to a relative tolerance.
+    pub fn scales_evenly(&self, tolerance: f64) -> bool {
+        let even = |scale: DVec3| {
+            let size = scale.abs();
+            size.max_element() - size.min_element() <= tolerance * size.max_element()
+        };
+        let at_rest = match self.local {
+            Trs::Parts { scale, .. } => even(scale),
+            Trs::Matrix(matrix) => {
+                let m = matrix.matrix3;
+                let [x, y, z] = [m.x_axis, m.y_axis, m.z_axis];
+                let lengths = DVec3::new(x.length(), y.length(), z.length());
+                let skew = x.dot(y).abs().max(y.dot(z).abs()).max(z.dot(x).abs());
+                even(lengths) && skew <= tolerance * lengths.max_element().powi(2)
+            }
+        };
+        let animated = |channel: &Channel| match channel {
+            Channel::Scale(keys) => keys.values.iter().all(|scale| even(scale.as_dvec3())),
+            _ => true,
+        };
+        at_rest && self.channels.iter().all(animated)
+    }
+
     /// A node that stands still.
     pub fn fixed(path: impl Into<String>, parent: Option<u32>, local: Trs) -> Node {
         Node { path: path.into(), parent, local, channels: Vec::new() }

@@ -3,7 +3,7 @@
 //! `cargo bench --bench light_tree`
 
 use candelabra::bounds::{Aabb, Cone, LightBounds};
-use candelabra::light_tree::{LightSummary, LightTree, LightTreeWriter, Link, Receiver};
+use candelabra::light_tree::{LightSummary, LightTree, LightTreeWriter, Link, Receiver, TreeKind};
 use candelabra::math::random::{hash, widen};
 use candelabra::pipeline::open_tree;
 use candelabra::store::AlignedBytes;
@@ -36,6 +36,7 @@ fn triangles(count: u32) -> Vec<LightBounds> {
                 aabb: Aabb::around([a, b, c]),
                 cone: Cone::flat(normal.normalize_or(Vec3::Z), false),
                 energy: normal.length() * (0.5 + random(i, 7)) + 1e-9,
+                range_m: f32::INFINITY,
             }
         })
         .collect()
@@ -43,13 +44,13 @@ fn triangles(count: u32) -> Vec<LightBounds> {
 
 fn build(bounds: &[LightBounds]) -> AlignedBytes {
     let mut writer = LightTreeWriter::default();
-    writer.add_tree(bounds, |i| Link::Emitter(i as u32));
+    writer.add_tree(TreeKind::Still, bounds, |i| Link::Emitter(i as u32));
     writer.add_light(&LightSummary {
         path: "/mesh".into(),
         fingerprint: [0; 32],
         emitter_count: bounds.len() as u32,
         energy: 1.0,
-        moves: false,
+        class: 0,
     });
     writer.finish("{}", [0; 32])
 }

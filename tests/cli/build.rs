@@ -10,7 +10,7 @@ fn a_scene_becomes_a_tree_beside_it() {
     let shot = Shot::still();
     shot.candelabra(&format!("build {SCENE}"))
         .ends(0)
-        .says("1 lights, 2 emitters (0 move)")
+        .says("1 lights, 2 emitters (0 change)")
         .says("shot.ltree");
     assert_eq!(shot.names(), [SCENE, "shot.ltree"], "no temporary files are left");
     shot.candelabra("inspect shot.ltree").ends(0).says("sound").says("/lamp");
@@ -41,10 +41,10 @@ fn a_tree_that_is_up_to_date_is_left_alone() {
 #[test]
 fn a_moving_light_has_a_tree_for_every_frame() {
     let shot = Shot::moving();
-    shot.candelabra(&format!("build {SCENE}")).ends(0).says("2 emitters (2 move)");
-    shot.candelabra("inspect shot.ltree").ends(0).says("25 trees, 25 frames");
-    shot.candelabra(&format!("build {SCENE} --frames 5,1,9")).ends(0).says("(2 move)");
-    shot.candelabra("inspect shot.ltree").ends(0).says("3 trees, 3 frames");
+    shot.candelabra(&format!("build {SCENE}")).ends(0).says("2 emitters (2 change)");
+    shot.candelabra("inspect shot.ltree").ends(0).says("25 trees, 0 instances, 25 frames");
+    shot.candelabra(&format!("build {SCENE} --frames 5,1,9")).ends(0).says("(2 change)");
+    shot.candelabra("inspect shot.ltree").ends(0).says("3 trees, 0 instances, 3 frames");
 }
 
 #[test]

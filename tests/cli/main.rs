@@ -2,6 +2,7 @@
 
 mod build;
 mod files;
+mod lights;
 mod render;
 mod resume;
 mod trees;

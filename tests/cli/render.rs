@@ -32,7 +32,7 @@ fn image_of(shot: &Shot, name: &str) -> Vec<[f32; 3]> {
 #[test]
 fn every_light_sampler_sees_the_lamp() {
     let shot = Shot::still();
-    for sampler in ["uniform", "power", "tree", "exhaustive"] {
+    for sampler in ["uniform", "power", "distance", "tree", "exhaustive", "all"] {
         shot.render(&format!("--light-sampler {sampler} -o {sampler}.exr")).ends(0);
         image_of(&shot, &format!("{sampler}.exr"));
     }

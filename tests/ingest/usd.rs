@@ -205,7 +205,7 @@ fn a_light_that_is_dark_at_first_is_one() {
     });
     assert_eq!(scene.requirements().mesh_lights, 1);
     let emitters = candelabra::emitter::Emitters::collect(&scene);
-    assert_eq!((emitters.len(), emitters.static_count()), (1, 0));
+    assert_eq!((emitters.len(), emitters.changing_count()), (1, 1));
     assert!(emitters.lights()[0].varies);
     let dark = load(|file| {
         let values = json!({"times": [0, 1], "rgb": [[0, 0, 0], [0, 0, 0]]});

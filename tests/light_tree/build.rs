@@ -2,13 +2,13 @@
 
 use crate::support::{Tree, emitters, nodes, tree_over};
 use candelabra::bounds::{Aabb, Cone, LightBounds};
-use candelabra::light_tree::{LightTree, LightTreeWriter, Link, Receiver, WIDTH};
+use candelabra::light_tree::{LightTree, LightTreeWriter, Link, Receiver, TreeKind, WIDTH};
 use candelabra::store::AlignedBytes;
 use glam::Vec3;
 use proptest::prelude::*;
 
 fn point(p: Vec3, energy: f32) -> LightBounds {
-    LightBounds { aabb: Aabb::around([p]), cone: Cone::ALL, energy }
+    LightBounds { aabb: Aabb::around([p]), cone: Cone::ALL, energy, range_m: f32::INFINITY }
 }
 
 /// Groups above the deepest leaf.
@@ -53,7 +53,7 @@ proptest! {
         bounds in emitters(20), at in any::<prop::sample::Index>(), bit in 0u8..8
     ) {
         let mut writer = LightTreeWriter::default();
-        writer.add_tree(&bounds, |i| Link::Emitter(i as u32));
+        writer.add_tree(TreeKind::Still, &bounds, |i| Link::Emitter(i as u32));
         let bytes = writer.finish("", [0; 32]);
         let mut damaged = bytes.as_ref().to_vec();
         damaged[at.index(bytes.as_ref().len())] ^= 1 << bit;

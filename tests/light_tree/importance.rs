@@ -1,33 +1,10 @@
 //! Importance 0 is a proof of darkness, and importance has no unit but the light's.
 
-use crate::support::{emitters, receiver, tree_over};
+use crate::support::{can_light, emitters, receiver, tree_over};
 use candelabra::bounds::LightBounds;
 use candelabra::light_tree::{Link, Node, Receiver};
 use glam::Vec3;
 use proptest::prelude::*;
-
-/// Whether anything inside the bounds could light the receiver: tried at points of the box and for
-/// normals of the cone, in double precision.
-fn can_light(bounds: &LightBounds, receiver: &Receiver) -> bool {
-    let steps = [0.0, 0.25, 0.5, 0.75, 1.0];
-    let (min, extent) = (bounds.aabb.min.as_dvec3(), bounds.aabb.extent().as_dvec3());
-    let (axis, normal) = (bounds.cone.axis.as_dvec3(), receiver.normal.as_dvec3());
-    let reach = f64::from(bounds.cone.theta_o + bounds.cone.theta_e).min(std::f64::consts::PI);
-    steps.iter().any(|x| {
-        steps.iter().any(|y| {
-            steps.iter().any(|z| {
-                let p = min + extent * glam::DVec3::new(*x, *y, *z);
-                let Some(to_light) = (p - receiver.point.as_dvec3()).try_normalize() else {
-                    return true;
-                };
-                let received = receiver.normal == Vec3::ZERO || normal.dot(to_light) > 1e-6;
-                let cosine = axis.normalize().dot(-to_light);
-                let cosine = if bounds.cone.two_sided { cosine.abs() } else { cosine };
-                received && cosine.clamp(-1.0, 1.0).acos() < reach - 1e-6
-            })
-        })
-    })
-}
 
 proptest! {
     #[test]
@@ -48,7 +25,7 @@ proptest! {
                     Link::Emitter(emitter) => {
                         prop_assert!(!dark || !can_light(&bounds[emitter as usize], &receiver));
                     }
-                    Link::Tree(_) | Link::Nothing => unreachable!(),
+                    Link::Instance(_) | Link::Nothing => unreachable!(),
                 }
             }
         }
@@ -75,6 +52,7 @@ proptest! {
                 min: bounds[0].aabb.min * scale,
                 max: bounds[0].aabb.max * scale,
             },
+            range_m: bounds[0].range_m * scale,
             ..bounds[0]
         };
         let at = Node::encode(&bounds[0], Link::Emitter(0)).importance(&receiver);
@@ -92,6 +70,7 @@ fn a_point_obeys_the_inverse_square_and_the_cosine() {
         aabb: candelabra::bounds::Aabb::around([Vec3::new(0.0, 0.0, 2.0)]),
         cone: candelabra::bounds::Cone::ALL,
         energy: 8.0,
+        range_m: f32::INFINITY,
     };
     let node = Node::encode(&bounds, Link::Emitter(0));
     let facing = Receiver { point: Vec3::ZERO, normal: Vec3::Z };
@@ -118,7 +97,8 @@ fn light_at_the_very_edge_is_not_called_dark() {
         let theta_o = if step % 3 == 0 { 0.0 } else { 3.0 * random(1) };
         let cone = Cone { theta_o: theta_o as f32, ..Cone::flat(Vec3::Y, false) };
         let aabb = Aabb { min: -half, max: half };
-        let node = Node::encode(&LightBounds { aabb, cone, energy: 1.0 }, Link::Emitter(0));
+        let bounds = LightBounds { aabb, cone, energy: 1.0, range_m: f32::INFINITY };
+        let node = Node::encode(&bounds, Link::Emitter(0));
         // What sampling sees, exactly.
         let bounds = node.bounds();
         let radius = node.half_extent().as_dvec3().length();

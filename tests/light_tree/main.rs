@@ -1,6 +1,13 @@
 //! Laws of the light tree over random and adversarial sets of bounds.
 
 mod build;
+mod city;
+mod extremes;
 mod importance;
+mod instances;
+mod invariance;
+mod measure;
 mod sampling;
+mod scenes;
+mod splitting;
 mod support;

@@ -1,23 +1,10 @@
 //! `sample` and `probability` tell the same story.
 
-use crate::support::{dead_probability, emitters, receiver, tree_over};
+use crate::support::{dead_probability, emitters, probabilities, receiver, tree_over, with_tree};
 use candelabra::bounds::{Aabb, LightBounds};
-use candelabra::light_tree::{FrameTree, Receiver};
+use candelabra::light_tree::Receiver;
 use glam::{Quat, Vec3};
 use proptest::prelude::*;
-
-/// Runs `check` on the tree of the only frame.
-fn with_tree<T>(bounds: &[LightBounds], check: impl FnOnce(&FrameTree) -> T) -> T {
-    let tree = tree_over(bounds);
-    let table = tree.leaf_table();
-    check(&tree.at_frame(0, &table).unwrap())
-}
-
-fn probabilities(bounds: &[LightBounds], receiver: &Receiver) -> Vec<f64> {
-    with_tree(bounds, |tree| {
-        (0..bounds.len() as u32).map(|emitter| tree.probability(receiver, emitter)).collect()
-    })
-}
 
 proptest! {
     #[test]
@@ -33,7 +20,7 @@ proptest! {
             for i in 0..64 {
                 let u = (f64::from(i) + 0.5) / 64.0;
                 if let Some(pick) = tree.sample(&receiver, u) {
-                    let told = tree.probability(&receiver, pick.emitter);
+                    let told = tree.probability(&receiver, pick.light.emitter().unwrap());
                     prop_assert!((pick.probability - told).abs() <= 1e-12 * told);
                     prop_assert!((0.0..1.0).contains(&pick.leftover));
                 }
@@ -51,7 +38,7 @@ proptest! {
             for i in 0..PICKS {
                 let u = (f64::from(i) + 0.5) / f64::from(PICKS);
                 if let Some(pick) = tree.sample(&receiver, u) {
-                    counts[pick.emitter as usize] += 1;
+                    counts[pick.light.emitter().unwrap() as usize] += 1;
                 }
             }
         });
@@ -69,6 +56,7 @@ proptest! {
         let scaled: Vec<_> = bounds.iter().map(|b| LightBounds {
             aabb: Aabb { min: b.aabb.min * s, max: b.aabb.max * s },
             energy: b.energy * e,
+            range_m: b.range_m * s,
             ..*b
         }).collect();
         let there = Receiver { point: receiver.point * s, ..receiver };
@@ -90,6 +78,7 @@ fn the_axes_are_equals() {
                 aabb: Aabb::around([p, p + Vec3::splat(0.01)]),
                 cone: candelabra::bounds::Cone::flat(axis, false),
                 energy: 1.0 + t.sin().abs(),
+                range_m: f32::INFINITY,
             }
         })
         .collect();
@@ -123,6 +112,7 @@ fn the_ends_of_the_random_number_are_safe() {
             aabb: Aabb::around([Quat::from_rotation_y(0.3) * Vec3::X]),
             cone: candelabra::bounds::Cone::ALL,
             energy: 1.0,
+            range_m: f32::INFINITY,
         };
         1000
     ];
@@ -144,6 +134,7 @@ fn deep_trees_keep_their_probabilities() {
             aabb: Aabb::around([Vec3::X * 10f32.powi(i - 15)]),
             cone: candelabra::bounds::Cone::ALL,
             energy: 10f32.powi(2 * (i - 15)),
+            range_m: f32::INFINITY,
         })
         .collect();
     let receiver = Receiver { point: Vec3::ZERO, normal: Vec3::X };

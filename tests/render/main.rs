@@ -5,14 +5,18 @@ mod bounces;
 mod closed_forms;
 mod determinism;
 mod extremes;
+mod fog;
+mod forced;
 mod lens;
 mod moving;
+mod ranges;
 mod real;
 mod references;
 mod rooms;
 mod shadows;
 #[path = "../ingest/shared.rs"]
 mod shared;
+mod shared_trees;
 mod stage;
 mod statistics;
 mod strategies;

@@ -111,16 +111,14 @@ impl Stage {
         self.scene.materials.push(material);
         let material = Some(self.scene.materials.len() as u32 - 1);
         self.scene.meshes.push(Mesh { material, ..mesh });
-        let mesh = self.scene.meshes.len() as u32 - 1;
+        self.again(self.scene.meshes.len() as u32 - 1, node)
+    }
+
+    /// Puts a mesh that is there already at a node.
+    pub fn again(&mut self, mesh: u32, node: u32) -> &mut Instance {
         let path = format!("/mesh_{}", self.scene.instances.len());
-        self.scene.instances.push(Instance {
-            path,
-            node,
-            mesh,
-            values: None,
-            shaping: None,
-            forced: false,
-        });
+        let (values, shaping) = (None, None);
+        self.scene.instances.push(Instance { path, node, mesh, values, shaping, forced: false });
         self.scene.instances.last_mut().unwrap()
     }
 

@@ -2,8 +2,10 @@
 
 use candelabra::render::frame_names::FrameNames;
 use candelabra::render::frames::Frames;
-use candelabra::render::{LightStrategy, RenderSettings};
+use candelabra::render::{LightStrategy, RenderSettings, SplitBy};
+use candelabra::scene::Medium;
 use clap::{Parser, ValueEnum};
+use glam::Vec3;
 use std::path::PathBuf;
 
 /// Renders the frames of a shot through a light tree.
@@ -44,6 +46,23 @@ pub struct Arguments {
     /// How lights are picked
     #[arg(long, value_enum, default_value_t = Strategy::Tree)]
     pub light_sampler: Strategy,
+    /// How readily clusters of lights are split: 0 samples one light at a point, 1 every one
+    #[arg(long, default_value_t = RenderSettings::default().split, value_parser = knob)]
+    pub split: f32,
+    /// At most so many lights are sampled at a point, beside the forced ones
+    #[arg(long, default_value_t = RenderSettings::default().max_lights, value_parser = clap::value_parser!(u32).range(1..))]
+    pub max_lights: u32,
+    /// What makes a cluster worth splitting
+    #[arg(long, value_enum, default_value_t = Test::Variance)]
+    pub split_by: Test,
+    /// Leave the lights at or below a prim path out of all estimates and sample them at every point;
+    /// may be given again. The tree must have been built with the same
+    #[arg(long, value_name = "PATH")]
+    pub force_light: Vec<String>,
+    /// Fill the scene with fog, in place of its own: extinction per metre, albedo (1 if not given)
+    /// and anisotropy (0), as 0.02,0.9,0.3
+    #[arg(long, value_name = "EXTINCTION,ALBEDO,G", value_parser = fog)]
+    pub fog: Option<Medium>,
     /// Write a PNG beside each picture
     #[arg(long)]
     pub png: bool,
@@ -68,10 +87,53 @@ pub enum Strategy {
     Uniform,
     /// By energy, the same everywhere
     Power,
+    /// Through the light tree, by energy and distance but without orientation
+    Distance,
     /// By importance, through the light tree
     Tree,
-    /// By the importance of every emitter: the ideal, slow
+    /// By the importance of every emitter: what a perfect traversal would do; slow
     Exhaustive,
+    /// All of them, at every point: the traditional loop; slow
+    All,
+}
+
+/// What makes a cluster worth splitting.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Test {
+    /// Its part in the variance of one sample
+    Variance,
+    /// As Conty and Kulla showed it: its solid angle times the peak of the BSDF; all clusters left are sampled
+    SolidAngle,
+}
+
+fn knob(text: &str) -> Result<f32, String> {
+    let knob = text.parse().ok().filter(|knob| (0.0..=1.0).contains(knob));
+    knob.ok_or_else(|| "write a number from 0 to 1".into())
+}
+
+fn fog(text: &str) -> Result<Medium, String> {
+    let numbers: Option<Vec<f32>> = text.split(',').map(|part| part.trim().parse().ok()).collect();
+    let numbers = numbers.filter(|numbers| (1..=3).contains(&numbers.len()));
+    let Some(numbers) = numbers else {
+        return Err("write EXTINCTION,ALBEDO,G, such as 0.02,0.9,0.3".into());
+    };
+    let albedo = numbers.get(1).copied().unwrap_or(1.0);
+    let anisotropy = numbers.get(2).copied().unwrap_or(0.0);
+    let extinction = numbers[0];
+    if !(extinction >= 0.0 && extinction.is_finite()) {
+        Err("extinction is not a positive number".into())
+    } else if !(0.0..=1.0).contains(&albedo) {
+        Err("albedo is not in [0, 1]".into())
+    } else if !(anisotropy.abs() < 1.0) {
+        Err("g is not between -1 and 1".into())
+    } else {
+        Ok(Medium {
+            scattering: Vec3::splat(extinction * albedo),
+            absorption: Vec3::splat(extinction * (1.0 - albedo)),
+            anisotropy,
+            region: None,
+        })
+    }
 }
 
 /// The largest width and height.
@@ -115,8 +177,16 @@ impl Arguments {
             strategy: match self.light_sampler {
                 Strategy::Uniform => LightStrategy::Uniform,
                 Strategy::Power => LightStrategy::Power,
+                Strategy::Distance => LightStrategy::Distance,
                 Strategy::Tree => LightStrategy::Tree,
                 Strategy::Exhaustive => LightStrategy::Exhaustive,
+                Strategy::All => LightStrategy::All,
+            },
+            split: self.split,
+            max_lights: self.max_lights,
+            split_by: match self.split_by {
+                Test::Variance => SplitBy::Variance,
+                Test::SolidAngle => SplitBy::SolidAngle,
             },
             mis: true,
         }

@@ -2,7 +2,7 @@
 
 use crate::arguments::Arguments;
 use crate::progress::Bar;
-use anyhow::{Context, Result, anyhow, bail};
+use anyhow::{Context, Result, bail};
 use candelabra::emitter::Emitters;
 use candelabra::light_tree::{ALGORITHM_VERSION, LightTree};
 use candelabra::pipeline::{self, BuildOptions};
@@ -21,12 +21,14 @@ pub fn render(arguments: &Arguments) -> Result<usize> {
     if let Some(threads) = arguments.threads {
         rayon::ThreadPoolBuilder::new().num_threads(threads.into()).build_global()?;
     }
-    let scene = pipeline::load_scene(&arguments.scene)?;
+    let mut scene = pipeline::load_scene(&arguments.scene)?;
+    pipeline::force_lights(&mut scene, &arguments.force_light)
+        .with_context(|| arguments.scene.display().to_string())?;
+    if let Some(fog) = &arguments.fog {
+        scene.medium = Some(fog.clone());
+    }
     for note in &scene.notes {
         eprintln!("note: {note}");
-    }
-    if scene.lights.iter().any(|l| l.forced) || scene.instances.iter().any(|i| i.forced) {
-        eprintln!("note: lights that ask to be sampled at every point are sampled like all others");
     }
     let frames = match &arguments.frames {
         Some(frames) => frames.clone(),
@@ -34,7 +36,7 @@ pub fn render(arguments: &Arguments) -> Result<usize> {
     };
     arguments.output.check(&frames)?;
     refuse_to_overwrite(arguments, &scene, &frames)?;
-    let camera = find_camera(&scene, arguments.camera.as_deref())?;
+    let camera = pipeline::find_camera(&scene, arguments.camera.as_deref())?.clone();
     let emitters = Emitters::collect(&scene);
     match &arguments.tree {
         Some(path) => {
@@ -77,27 +79,6 @@ fn program_fingerprint() -> [u8; 32] {
     *blake3::hash(&bytes).as_bytes()
 }
 
-fn find_camera(scene: &Scene, wanted: Option<&str>) -> Result<Camera> {
-    let path_of = |camera: &Camera| scene.nodes[camera.node as usize].path.clone();
-    let found = match wanted {
-        None => scene.cameras.first(),
-        Some(name) => scene
-            .cameras
-            .iter()
-            .find(|camera| path_of(camera) == name)
-            .or_else(|| name.parse::<usize>().ok().and_then(|number| scene.cameras.get(number))),
-    };
-    found.cloned().ok_or_else(|| {
-        let source = scene.source.display();
-        let all: Vec<_> = scene.cameras.iter().map(path_of).collect();
-        match wanted {
-            _ if all.is_empty() => anyhow!("{source}: the scene has no camera; add one to it"),
-            None => anyhow!("{source}: no camera"),
-            Some(name) => anyhow!("{source}: no camera '{name}'; it has {}", all.join(", ")),
-        }
-    })
-}
-
 /// What a picture was rendered from, kept in its metadata.
 #[derive(Serialize, Deserialize)]
 struct Stamp {
@@ -123,8 +104,11 @@ impl Stamp {
         let mut hasher = blake3::Hasher::new();
         hasher.update(content.as_flattened());
         let (float, sound) = (arguments.float, !arguments.no_verify);
-        let rest =
-            format!("{SOFTWARE} {ALGORITHM_VERSION} {camera:?} {float} {sound} {settings} {frame}");
+        let (fog, forced) = (&arguments.fog, &arguments.force_light);
+        let rest = format!(
+            "{SOFTWARE} {ALGORITHM_VERSION} {camera:?} {fog:?} {forced:?} {float} {sound} \
+             {settings} {frame}"
+        );
         hasher.update(rest.as_bytes());
         let fingerprint = hasher.finalize().to_hex().to_string();
         Ok(Stamp { software: SOFTWARE.into(), frame, fingerprint, settings })

@@ -18,10 +18,14 @@ pub struct Arguments {
     /// The tree file to write; the scene's name with .ltree if not given
     #[arg(short, long)]
     output: Option<PathBuf>,
-    /// Frames to build for, if lights move: 1001-1048, 1001-1048x2, 1,5,9; the scene's own if not
+    /// Frames to build for, if lights change: 1001-1048, 1001-1048x2, 1,5,9; the scene's own if not
     /// given
     #[arg(long, allow_hyphen_values = true)]
     frames: Option<Frames>,
+    /// Leave the lights at or below a prim path out of all estimates and sample them at every point;
+    /// may be given again
+    #[arg(long, value_name = "PATH")]
+    force_light: Vec<String>,
     /// Threads; as many as there are cores if not given
     #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
@@ -38,7 +42,9 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let mut out = std::io::stdout().lock();
 
     let started = Instant::now();
-    let scene = pipeline::load_scene(&arguments.scene)?;
+    let mut scene = pipeline::load_scene(&arguments.scene)?;
+    pipeline::force_lights(&mut scene, &arguments.force_light)
+        .with_context(|| arguments.scene.display().to_string())?;
     for note in &scene.notes {
         eprintln!("note: {note}");
     }
@@ -60,11 +66,11 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         .with_context(|| arguments.scene.display().to_string())?;
     writeln!(
         out,
-        "{}: {} lights, {} emitters ({} move), read in {}",
+        "{}: {} lights, {} emitters ({} change), read in {}",
         arguments.scene.display(),
         survey.lights.len(),
         emitters.len(),
-        emitters.len() - emitters.static_count(),
+        emitters.changing_count(),
         Seconds(loaded),
     )?;
     if !arguments.force && is_up_to_date(&output, &survey) {

@@ -2,6 +2,7 @@
 
 use anyhow::Result;
 use candelabra::emitter::Emitters;
+use candelabra::light_tree::LightRow;
 use candelabra::pipeline;
 use candelabra::scene::{Requirements, Scene};
 use clap::Args;
@@ -46,10 +47,10 @@ fn inspect_scene(out: &mut impl Write, scene: &Scene) -> Result<()> {
     let emitters = Emitters::collect(scene);
     writeln!(
         out,
-        "  emitters    {} of {} lights; {} move or vary",
+        "  emitters    {} of {} lights; {} change",
         emitters.len(),
         emitters.lights().len(),
-        emitters.len() - emitters.static_count()
+        emitters.changing_count()
     )?;
     print_requirements(out, &scene.requirements())?;
     for note in &scene.notes {
@@ -95,12 +96,15 @@ fn inspect_tree(out: &mut impl Write, path: &Path) -> Result<()> {
         let need = if section.required != 0 { "required" } else { "optional" };
         writeln!(out, "  section {}  {:>12} bytes  {need}", section.id, section.length)?;
     }
+    let count = |class| tree.lights().iter().filter(|light| light.is(class)).count();
     writeln!(
         out,
-        "  {emitters} emitters of {} lights, {} move; {} trees, {} frames",
+        "  {emitters} emitters of {} lights, {} lights change, {} are forced; {} trees, {} instances, {} frames",
         tree.lights().len(),
-        emitters - tree.static_emitter_count(),
+        count(LightRow::CHANGES),
+        count(LightRow::FORCED),
         tree.trees().len(),
+        tree.instances().len(),
         tree.frames().len()
     )?;
     let total: f64 = tree.lights().iter().map(|light| f64::from(light.energy)).sum();

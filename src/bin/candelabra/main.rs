@@ -2,6 +2,9 @@
 
 mod build;
 mod inspect;
+mod measure;
+mod race;
+mod shot;
 
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
@@ -20,12 +23,18 @@ enum Command {
     Build(build::Arguments),
     /// Print what is in a scene or in a tree file, and what the scene requires
     Inspect(inspect::Arguments),
+    /// Compute exactly how far off each strategy of picking lights is, at points of a picture
+    Measure(measure::Arguments),
+    /// Render with several settings and compare their errors and times
+    Race(race::Arguments),
 }
 
 fn main() -> ExitCode {
     let outcome = match Arguments::parse().command {
         Command::Build(arguments) => build::run(&arguments),
         Command::Inspect(arguments) => inspect::run(&arguments),
+        Command::Measure(arguments) => measure::run(&arguments),
+        Command::Race(arguments) => race::run(&arguments),
     };
     match outcome {
         Ok(()) => ExitCode::SUCCESS,

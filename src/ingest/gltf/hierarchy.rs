@@ -119,7 +119,7 @@ impl Walk<'_> {
         let bytes = size_of::<Node>() + 2 * node.path.len();
         output.budget.take(bytes as u64, || "nodes".to_string())?;
         let above = node.parent.is_none_or(|parent| self.uniform[parent as usize]);
-        self.uniform.push(above && scales_evenly(&node));
+        self.uniform.push(above && node.scales_evenly(UNIFORM_TOLERANCE));
         output.scene.nodes.push(node);
         Ok(output.scene.nodes.len() as u32 - 1)
     }
@@ -234,26 +234,4 @@ fn local(row: &Transform) -> Trs {
         rotation: rotation.map_or(DQuat::IDENTITY, DQuat::normalize),
         scale: row.scale.map_or(DVec3::ONE, vector),
     }
-}
-
-/// Whether a node's own transform keeps spheres spheres at every time.
-fn scales_evenly(node: &Node) -> bool {
-    let even = |scale: DVec3| {
-        let size = scale.abs();
-        size.max_element() - size.min_element() <= UNIFORM_TOLERANCE * size.max_element()
-    };
-    let at_rest = match node.local {
-        Trs::Parts { scale, .. } => even(scale),
-        Trs::Matrix(matrix) => {
-            let [x, y, z] = [matrix.matrix3.x_axis, matrix.matrix3.y_axis, matrix.matrix3.z_axis];
-            let lengths = DVec3::new(x.length(), y.length(), z.length());
-            let skew = x.dot(y).abs().max(y.dot(z).abs()).max(z.dot(x).abs());
-            even(lengths) && skew <= UNIFORM_TOLERANCE * lengths.max_element().powi(2)
-        }
-    };
-    let animated = |channel: &Channel| match channel {
-        Channel::Scale(keys) => keys.values.iter().all(|scale| even(scale.as_dvec3())),
-        _ => true,
-    };
-    at_rest && node.channels.iter().all(animated)
 }

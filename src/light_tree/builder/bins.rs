@@ -33,7 +33,7 @@ impl Bin {
     };
 
     pub fn of(item: &Item) -> Bin {
-        let LightBounds { aabb, cone, energy } = item.bounds;
+        let LightBounds { aabb, cone, energy, .. } = item.bounds;
         let energy = f64::from(energy);
         let mean =
             if cone.theta_o == 0.0 { 1.0 } else { 0.5 + 0.5 * f64::from(cone.theta_o.cos()) };

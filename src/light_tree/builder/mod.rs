@@ -14,14 +14,13 @@ mod saoh;
 
 use super::group::{Group, WIDTH};
 use super::node::{Link, MOST, Node};
-use super::records::Parent;
 use crate::bounds::LightBounds;
 use bytemuck::Zeroable;
 use rayon::prelude::*;
 use saoh::Halves;
 
 /// Changes whenever the same bounds would give other bytes: part of every fingerprint.
-pub const ALGORITHM_VERSION: u32 = 1;
+pub const ALGORITHM_VERSION: u32 = 2;
 
 /// Below this depth clusters are cut by count: no input makes the recursion much deeper.
 const DEEPEST_BY_COST: usize = 100;
@@ -35,23 +34,8 @@ pub(super) struct Item {
     index: u32,
 }
 
-/// Groups in preorder: a group stands before those of its children.
-#[derive(Default)]
-pub(super) struct Groups {
-    pub groups: Vec<Group>,
-    /// For each group the lane that leads to it.
-    pub parents: Vec<Parent>,
-}
-
-impl Groups {
-    fn append(&mut self, mut other: Groups) {
-        self.groups.append(&mut other.groups);
-        self.parents.append(&mut other.parents);
-    }
-}
-
 /// Builds a tree over some bounds, all of them [sound](LightBounds::is_sound), and appends its
-/// groups to `out`; `link` tells what each of the bounds is. Returns the bounds of everything;
+/// groups to `out` in preorder, a group before those of its children; `link` tells what each of the bounds is. Returns the bounds of everything;
 /// `None` if there are none.
 ///
 /// # Panics
@@ -59,7 +43,7 @@ impl Groups {
 pub(super) fn build_tree(
     bounds: &[LightBounds],
     link: &(impl Fn(usize) -> Link + Sync),
-    out: &mut Groups,
+    out: &mut Vec<Group>,
 ) -> Option<LightBounds> {
     assert!(bounds.len() < MOST, "a tree has fewer than 2^30 leaves");
     if bounds.is_empty() {
@@ -74,15 +58,14 @@ fn build_cluster(
     items: &mut [Item],
     link: &(impl Fn(usize) -> Link + Sync),
     depth: usize,
-    out: &mut Groups,
+    out: &mut Vec<Group>,
 ) -> LightBounds {
-    let own = out.groups.len();
-    out.groups.push(Group::zeroed());
-    out.parents.push(Parent::NONE);
+    let own = out.len();
+    out.push(Group::zeroed());
     let go_parallel = items.len() > PARALLEL_ABOVE;
     let mut parts = divide(items, depth);
     let build_apart = |part: &mut &mut [Item]| {
-        let mut groups = Groups::default();
+        let mut groups = Vec::new();
         let bounds = (part.len() > 1).then(|| build_cluster(part, link, depth + 1, &mut groups));
         (bounds, groups)
     };
@@ -94,20 +77,18 @@ fn build_cluster(
             nodes.push(Node::encode(&item.bounds, link(item.index as usize)));
             continue;
         }
-        let first = out.groups.len();
+        let first = out.len();
         let bounds = match apart.get_mut(lane).map(std::mem::take) {
-            Some((Some(bounds), groups)) => {
-                out.append(groups);
+            Some((Some(bounds), mut groups)) => {
+                out.append(&mut groups);
                 bounds
             }
             _ => build_cluster(part, link, depth + 1, out),
         };
-        let ahead = (first - own) as u32;
-        out.parents[first] = Parent::new(ahead, lane);
-        nodes.push(Node::encode(&bounds, Link::Inner(ahead)));
+        nodes.push(Node::encode(&bounds, Link::Inner((first - own) as u32)));
     }
     for (lane, node) in nodes.iter().enumerate() {
-        out.groups[own].set(lane, node);
+        out[own].set(lane, node);
     }
     let rounded: Vec<LightBounds> = nodes.iter().map(Node::bounds).collect();
     LightBounds::around(&rounded)

@@ -25,9 +25,9 @@ pub fn canonical(bounds: &[LightBounds]) -> Vec<Item> {
 /// A total order over every number of the bounds. Equal bounds may swap: nobody can tell.
 fn total_order(a: &LightBounds, b: &LightBounds) -> Ordering {
     let numbers = |bounds: &LightBounds| {
-        let LightBounds { aabb, cone, energy } = *bounds;
+        let LightBounds { aabb, cone, energy, range_m } = *bounds;
         let vectors = [aabb.min, aabb.max, cone.axis].map(|v| v.to_array());
-        (vectors, [cone.theta_o, cone.theta_e, energy], cone.two_sided)
+        (vectors, [cone.theta_o, cone.theta_e, energy, range_m], cone.two_sided)
     };
     let ((va, sa, ta), (vb, sb, tb)) = (numbers(a), numbers(b));
     let pairs = va.as_flattened().iter().zip(vb.as_flattened()).chain(sa.iter().zip(&sb));

@@ -1,0 +1,45 @@
+//! What the commands that look at one frame of a shot have in common.
+
+use anyhow::{Context, Result, anyhow};
+use candelabra::emitter::Emitters;
+use candelabra::light_tree::LightTree;
+use candelabra::pipeline::{self, BuildOptions};
+use candelabra::scene::{Camera, Scene};
+use candelabra::store::AlignedBytes;
+use clap::Args;
+use std::path::PathBuf;
+
+#[derive(Args)]
+pub struct Arguments {
+    /// The scene: .gltf, .glb or .obj
+    scene: PathBuf,
+    /// The frame; the first of the scene if not given
+    #[arg(long, allow_negative_numbers = true)]
+    frame: Option<i32>,
+    /// Camera, by prim path or number; the first if not given
+    #[arg(long)]
+    camera: Option<String>,
+}
+
+/// A scene with the tree of one frame.
+pub struct Shot {
+    pub scene: Scene,
+    pub emitters: Emitters,
+    pub tree: LightTree<AlignedBytes>,
+    pub camera: Camera,
+    pub frame: i32,
+}
+
+impl Shot {
+    pub fn prepare(arguments: &Arguments) -> Result<Shot> {
+        let scene = pipeline::load_scene(&arguments.scene)?;
+        let name = || arguments.scene.display().to_string();
+        let camera = pipeline::find_camera(&scene, arguments.camera.as_deref())?.clone();
+        let emitters = Emitters::collect(&scene);
+        let frame = arguments.frame.unwrap_or_else(|| pipeline::frames_of(&scene)[0]);
+        let survey = pipeline::survey(&scene, &emitters, &[frame]).with_context(name)?;
+        let bytes = pipeline::build_tree(&survey, &BuildOptions::default());
+        let tree = LightTree::open(bytes).map_err(|error| anyhow!("{}: {error}", name()))?;
+        Ok(Shot { scene, emitters, tree, camera, frame })
+    }
+}

@@ -1,0 +1,225 @@
+//! How many samples a viewer is worth, and how far the tree is opened for it.
+//!
+//! The seed splits a cluster where one sample of it is not enough, and every part that is not split
+//! further gets one: each decision costs a shadow ray, and where decisions change there are seams in
+//! the noise. Looking is cheaper than tracing. So here the tree is first [opened](super::cut) where
+//! its estimates are uncertain, without taking any sample; and from the clusters that this leaves, the
+//! *cut*, so many are sampled as the uncertainty that remains is worth, a real number, each cluster
+//! with a chance in proportion to its importance and none twice. One sample is a plain pick, all
+//! clusters are all of them, and everything between varies smoothly. (Cuts: Walter et al. 2005;
+//! sampling them: Yuksel 2019, "Stochastic Lightcuts".) The seed's own rule stays for comparison.
+
+/// How splitting is asked for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Splitting {
+    /// `[0, 1]`: 0 takes one sample at a point, 1 takes every emitter that may light it. Means the
+    /// same at every scale of lengths and of energies.
+    pub knob: f32,
+    /// At most so many samples at a point.
+    pub most: u32,
+    /// What is opened, and what then is sampled.
+    pub test: SplitTest,
+}
+
+/// What makes a cluster worth splitting.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum SplitTest {
+    /// Its part in the relative variance of one sample: its share of all importance times the squared
+    /// relative deviation within it. As many samples are taken as what is left of that is worth.
+    #[default]
+    Variance,
+    /// The seed's: its solid angle times the peak of the BSDF towards it. Every cluster of the cut is
+    /// sampled.
+    SolidAngle,
+}
+
+/// At half a turn of the knob: the part in the relative variance above which a cluster is opened...
+const OPENED_ABOVE: f64 = 0.02;
+/// ...and the relative variance that is worth one more sample.
+const WORTH_A_SAMPLE: f64 = 0.04;
+/// The seed's measure above which a cluster is split at half a turn.
+const GLARE: f64 = 0.2;
+
+impl Splitting {
+    /// One sample at a point, by a plain descent.
+    pub const NONE: Splitting = Splitting { knob: 0.0, most: u32::MAX, test: SplitTest::Variance };
+
+    /// Every emitter that may light a point.
+    pub const ALL: Splitting = Splitting { knob: 1.0, ..Splitting::NONE };
+
+    /// Whether the tree is not opened at all.
+    pub fn is_off(&self) -> bool {
+        self.knob <= 0.0
+    }
+
+    /// Whether it is opened to the last emitter.
+    pub(super) fn is_full(&self) -> bool {
+        self.knob >= 1.0
+    }
+
+    /// What the knob multiplies thresholds by: from infinity down to zero.
+    fn ease(&self) -> f64 {
+        let knob = f64::from(self.knob).clamp(0.0, 1.0);
+        (1.0 - knob) / knob
+    }
+
+    /// The measure above which a cluster is opened.
+    pub(super) fn threshold(&self) -> f64 {
+        self.ease() * if self.test == SplitTest::SolidAngle { GLARE } else { OPENED_ABOVE }
+    }
+
+    /// How many of some clusters are sampled, given the relative variance of one sample of them.
+    pub(super) fn worth(&self, variance: f64, clusters: usize) -> f64 {
+        let all = (clusters as f64).min(f64::from(self.most)).max(1.0);
+        if self.is_full() || self.test == SplitTest::SolidAngle {
+            return all;
+        }
+        (1.0 + variance / (self.ease() * WORTH_A_SAMPLE)).min(all)
+    }
+}
+
+/// The largest number below 1.
+pub(super) const BELOW_ONE: f64 = 1.0 - f64::EPSILON / 2.0;
+
+/// Gives so many of some clusters a sample: each with a chance in proportion to its weight, or surely
+/// where that would be above 1. The chances add up to the count, or to the number of weights that are
+/// not zero if there are no more.
+pub(super) fn allot(weights: &[f64], count: u32, chances: &mut Vec<f64>) {
+    chances.clear();
+    let alive = weights.iter().filter(|&&weight| weight > 0.0).count();
+    if count as usize >= alive {
+        chances.extend(weights.iter().map(|&weight| if weight > 0.0 { 1.0 } else { 0.0 }));
+        return;
+    }
+    chances.resize(weights.len(), 0.0);
+    // Those that are sure take one sample each; what is left goes to the others.
+    let mut sure = 0;
+    loop {
+        let is_sure = |chance: f64| chance >= 1.0;
+        let others = weights.iter().zip(chances.iter()).filter(|(_, chance)| !is_sure(**chance));
+        let sum: f64 = others.map(|(weight, _)| weight).sum();
+        let each = f64::from(count - sure) / sum;
+        let mut more = 0;
+        for (weight, chance) in weights.iter().zip(chances.iter_mut()) {
+            if !is_sure(*chance) {
+                *chance = (weight * each).min(1.0);
+                more += u32::from(is_sure(*chance));
+            }
+        }
+        sure += more;
+        if more == 0 || sure >= count {
+            return;
+        }
+    }
+}
+
+/// Which clusters are taken, by one number in `[0, 1)`: all that are sure, and of the others, laid out
+/// along a line, those that a comb of step 1 meets (systematic sampling: neighbours in the tree are
+/// neighbours on the line, so samples are spread over the scene). With each comes what is left of the
+/// number, uniform in `[0, 1)`; a sure one leaves it whole.
+pub(super) fn comb(chances: &[f64], u: f64) -> impl Iterator<Item = (usize, f64)> + '_ {
+    let mut end = 0.0;
+    // The comb's teeth stand at u, u + 1, ...; `next` is the first that no cluster has met. There are
+    // as many as the chances add up to, also where rounding leaves room for one more.
+    let mut next = u;
+    let open: f64 = chances.iter().filter(|&&chance| chance < 1.0).sum();
+    let last = u + open.round();
+    chances.iter().enumerate().filter_map(move |(i, &chance)| {
+        if chance <= 0.0 {
+            return None;
+        }
+        if chance >= 1.0 {
+            return Some((i, u));
+        }
+        let start = end;
+        end += chance;
+        if next >= end || next >= last {
+            return None;
+        }
+        let leftover = ((next - start) / chance).clamp(0.0, BELOW_ONE);
+        next += 1.0;
+        Some((i, leftover))
+    })
+}
+
+/// A real number of samples as one of the two whole numbers beside it.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Rounded {
+    pub low: u32,
+    /// The chance of `low + 1`.
+    pub chance_of_more: f64,
+}
+
+impl Rounded {
+    pub fn new(worth: f64) -> Rounded {
+        let low = worth.floor();
+        Rounded { low: low as u32, chance_of_more: worth - low }
+    }
+
+    /// One of the two by a number in `[0, 1)`, and what is left of that.
+    pub fn draw(&self, u: f64) -> (u32, f64) {
+        let more = self.chance_of_more;
+        if u < more {
+            (self.low + 1, (u / more).min(BELOW_ONE))
+        } else {
+            (self.low, ((u - more) / (1.0 - more)).clamp(0.0, BELOW_ONE))
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn weights() -> impl Strategy<Value = Vec<f64>> {
+        let weight = prop_oneof![1 => Just(0.0), 4 => 1e-6..1.0, 1 => 1.0..1e6];
+        prop::collection::vec(weight, 1..40)
+    }
+
+    proptest! {
+        #[test]
+        fn chances_add_up_to_the_count(weights in weights(), count in 1u32..50) {
+            let alive = weights.iter().filter(|&&w| w > 0.0).count() as u32;
+            let mut chances = Vec::new();
+            allot(&weights, count, &mut chances);
+            let sum: f64 = chances.iter().sum();
+            prop_assert!((sum - f64::from(count.min(alive))).abs() < 1e-9, "{sum}");
+            for (chance, weight) in chances.iter().zip(weights) {
+                prop_assert!((0.0..=1.0).contains(chance) && (*chance > 0.0) == (weight > 0.0));
+            }
+        }
+
+        /// An even comb of numbers finds every cluster as often as its chance says, and never more
+        /// clusters than the count.
+        #[test]
+        fn clusters_are_taken_as_often_as_their_chance(weights in weights(), count in 1u32..50) {
+            const DRAWS: u32 = 2048;
+            let mut chances = Vec::new();
+            allot(&weights, count, &mut chances);
+            let mut taken = vec![0u32; weights.len()];
+            for i in 0..DRAWS {
+                let u = (f64::from(i) + 0.5) / f64::from(DRAWS);
+                let found: Vec<_> = comb(&chances, u).collect();
+                prop_assert!(found.len() as u32 <= count);
+                for (at, leftover) in found {
+                    taken[at] += 1;
+                    prop_assert!((0.0..1.0).contains(&leftover));
+                }
+            }
+            for (taken, chance) in taken.iter().zip(chances) {
+                prop_assert!((f64::from(*taken) - chance * f64::from(DRAWS)).abs() <= 2.0 + 1e-6);
+            }
+        }
+
+        #[test]
+        fn rounding_keeps_the_mean(worth in 1f64..80.0) {
+            let rounded = Rounded::new(worth);
+            let mean = f64::from(rounded.low) + rounded.chance_of_more;
+            prop_assert!((mean - worth).abs() < 1e-12);
+            let (count, leftover) = rounded.draw(rounded.chance_of_more * 0.5);
+            prop_assert!((0.0..1.0).contains(&leftover));
+            prop_assert!(count == rounded.low || count == rounded.low + 1);
+        }
+    }
+}

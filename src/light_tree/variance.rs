@@ -1,0 +1,132 @@
+//! The exact variance of an estimate that samples lights through the tree: no noise, no draws.
+//!
+//! Given what each light contributes, the variance of the sum over the picks follows in closed form.
+//! A cluster of the cut that contributes `F_c`, with a variance `V_c` of its own, is taken with a
+//! chance `n_c` and divided by `q_c`, adds `n_c V_c / q_c^2`; to which comes the variance over the
+//! choice of clusters of the sum of `F_c / q_c`. A comb takes them, so the latter is a step function
+//! of one number, which is integrated exactly. The two counts of samples that are drawn between mix
+//! by the law of total variance. Below a cluster, one descent has `sum of (V + F^2) / p - F^2`, group by
+//! group.
+
+use super::cut::{Entry, Picked, Scratch};
+use super::group::WIDTH;
+use super::sampling::{FrameTree, Next, Place, Weights};
+use super::splitting::{Splitting, comb};
+use super::viewer::Viewer;
+
+/// What an estimate is expected to be, and how far off.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Moments {
+    /// What it is in the mean: the sum of all contributions that can be picked.
+    pub mean: f64,
+    /// Its variance.
+    pub variance: f64,
+    /// How many lights are sampled.
+    pub lights: f64,
+}
+
+impl FrameTree<'_> {
+    /// The moments of the estimate of a sum over all lights from its
+    /// [picks](FrameTree::for_each_pick), given what each contributes, which may depend on how often
+    /// it is expected to be picked. Forced lights are no part of it.
+    pub fn moments<V: Viewer>(
+        &self,
+        viewer: &V,
+        beside: &[f64],
+        how: &Splitting,
+        contribution: &impl Fn(Picked, f64) -> f64,
+    ) -> Moments {
+        let mut scratch = Scratch::default();
+        let Some(cut) = self.cut(viewer, beside, how, None, &mut scratch) else {
+            return Moments::default();
+        };
+        let of_entry: Vec<(f64, f64)> = scratch
+            .entries
+            .iter()
+            .enumerate()
+            .map(|(number, entry)| {
+                let expected = cut.expected(&scratch, number);
+                match *entry {
+                    _ if expected <= 0.0 => (0.0, 0.0),
+                    Entry::Light(light) => (contribution(light, expected), 0.0),
+                    Entry::Cluster(place) => self.below(place, expected, contribution),
+                }
+            })
+            .collect();
+        let share = cut.rounded.chance_of_more;
+        let of_draw = |more: bool| {
+            let chances = cut.chances(&scratch, more);
+            let scaled = |(entry, (mean, variance)): (usize, &(f64, f64))| {
+                let divisor = cut.divisor(&scratch, entry, chances[entry]);
+                (mean / divisor, variance / (divisor * divisor))
+            };
+            of_comb(chances, &of_entry.iter().enumerate().map(scaled).collect::<Vec<_>>())
+        };
+        let low = of_draw(false);
+        let high = if share > 0.0 { of_draw(true) } else { low };
+        Moments {
+            mean: of_entry.iter().map(|(mean, _)| mean).sum(),
+            variance: (1.0 - share) * low.1
+                + share * high.1
+                + share * (1.0 - share) * (high.0 - low.0).powi(2),
+            lights: (0..of_entry.len()).map(|entry| cut.expected(&scratch, entry)).sum(),
+        }
+    }
+
+    /// Mean and variance of what one descent from a place finds, over its probability; `expected` is
+    /// how many descents there are.
+    fn below<V: Viewer>(
+        &self,
+        place: Place<V>,
+        expected: f64,
+        contribution: &impl Fn(Picked, f64) -> f64,
+    ) -> (f64, f64) {
+        let nothing = (0.0, 0.0);
+        let Some(group) = self.group(&place) else { return nothing };
+        let Some(weights) = Weights::of(group, &place.viewer) else { return nothing };
+        let (mut mean, mut second) = nothing;
+        for lane in (0..WIDTH).filter(|&lane| weights.of_lane[lane] > 0.0) {
+            let share = weights.share(lane);
+            let (own, variance) = match self.follow(&place, group.link(lane)) {
+                None => nothing,
+                Some(Next::Group(place)) => self.below(place, expected * share, contribution),
+                Some(Next::Emitter(emitter)) => {
+                    (contribution(Picked::Emitter(emitter), expected * share), 0.0)
+                }
+            };
+            mean += own;
+            second += (variance + own * own) / share;
+        }
+        (mean, (second - mean * mean).max(0.0))
+    }
+}
+
+/// Mean and variance of a sum over the clusters that a comb takes, given those of each that is taken.
+fn of_comb(chances: &[f64], of_entry: &[(f64, f64)]) -> (f64, f64) {
+    let alive = || chances.iter().zip(of_entry).filter(|(chance, _)| **chance > 0.0);
+    let mean: f64 = alive().map(|(chance, (mean, _))| chance * mean).sum();
+    let within: f64 = alive().map(|(chance, (_, variance))| chance * variance).sum();
+    // Between two neighbouring fractions of the clusters' ends the comb takes the same ones.
+    let is_open = |chance: f64| chance > 0.0 && chance < 1.0;
+    let (mut end, mut expected) = (0.0, 0.0);
+    let mut steps = vec![1.0];
+    for (&chance, (mean, _)) in chances.iter().zip(of_entry) {
+        if is_open(chance) {
+            end += chance;
+            expected += chance * mean;
+            steps.push(f64::fract(end));
+        }
+    }
+    steps.sort_unstable_by(f64::total_cmp);
+    let (mut from, mut between) = (0.0, 0.0);
+    for to in steps {
+        if to > from {
+            let taken =
+                comb(chances, 0.5 * (from + to)).filter(|&(entry, _)| is_open(chances[entry]));
+            let sum: f64 = taken.map(|(entry, _)| of_entry[entry].0).sum();
+            between += (to - from) * (sum - expected).powi(2);
+            from = to;
+        }
+    }
+    (mean, within + between)
+}

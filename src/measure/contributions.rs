@@ -1,0 +1,123 @@
+//! What every light gives to a point.
+
+use crate::light_tree::Picked;
+use crate::math::color::luminance;
+use crate::render::direct::power_heuristic;
+use crate::render::path::{Integrator, Vertex};
+use glam::Vec2;
+use std::collections::HashMap;
+
+/// Points of an emitter that its contribution is averaged over: a square lattice.
+const POINTS_ALONG: u32 = 3;
+
+/// Contributions to one point, by light.
+pub struct Contributions {
+    of_emitter: Vec<Contribution>,
+    beside: Vec<Contribution>,
+}
+
+/// Of one light.
+#[derive(Clone, Copy, Debug, Default)]
+struct Contribution {
+    /// Luminance that the point reflects of it.
+    luminance: f32,
+    /// How many times as often reflected rays find it as samples of it do.
+    by_reflection: f32,
+}
+
+impl Contributions {
+    /// What a vertex reflects of each light that is not forced: from the middles of a lattice over each
+    /// emitter, and with `visibility` only if a ray to its middle finds it.
+    pub fn at(integrator: &Integrator, vertex: &Vertex, visibility: bool) -> Contributions {
+        let emitters = integrator.picker.tree().unforced_count();
+        let of = |light| contribution(integrator, vertex, light, visibility);
+        Contributions {
+            of_emitter: (0..emitters).map(|emitter| of(Picked::Emitter(emitter))).collect(),
+            beside: (0..integrator.infinite.len() as u32)
+                .map(|row| match integrator.infinite[row as usize].forced {
+                    true => Contribution::default(),
+                    false => of(Picked::Beside(row)),
+                })
+                .collect(),
+        }
+    }
+
+    /// Of one light, that part which falls to picking it if it is expected to be picked so often.
+    pub fn of(&self, light: Picked, expected: f64) -> f64 {
+        let Contribution { luminance, by_reflection } = match light {
+            Picked::Emitter(emitter) => self.of_emitter[emitter as usize],
+            Picked::Beside(row) => self.beside[row as usize],
+        };
+        f64::from(luminance) * f64::from(power_heuristic(expected as f32, by_reflection))
+    }
+
+    /// Of all lights, however they are found.
+    pub fn sum(&self) -> f64 {
+        let all = self.of_emitter.iter().chain(&self.beside);
+        all.map(|light| f64::from(light.luminance)).sum()
+    }
+
+    /// `sum of f^2 / p - F^2`: the variance of one sample, given the probability of each light.
+    pub fn variance_of_one(&self, probability: impl Fn(Picked) -> f64) -> f64 {
+        let emitters = (0..self.of_emitter.len() as u32).map(Picked::Emitter);
+        let all = emitters.chain((0..self.beside.len() as u32).map(Picked::Beside));
+        let (mut mean, mut second) = (0.0, 0.0);
+        for light in all {
+            let probability = probability(light);
+            let own = if probability > 0.0 { self.of(light, probability) } else { 0.0 };
+            if own > 0.0 {
+                mean += own;
+                second += own * own / probability;
+            }
+        }
+        (second - mean * mean).max(0.0)
+    }
+}
+
+fn contribution(
+    integrator: &Integrator,
+    vertex: &Vertex,
+    light: Picked,
+    visibility: bool,
+) -> Contribution {
+    let point = vertex.receiver.point;
+    let at = |u: Vec2| {
+        let found = integrator.incoming(light, point, vertex.receiver.normal, u)?;
+        if !vertex.lets_through(found.direction) {
+            return None;
+        }
+        let (reflected, bsdf_pdf) = vertex.bsdf.eval(vertex.wo, found.direction);
+        let pdf = found.pdf.unwrap_or(1.0);
+        let value = Contribution {
+            luminance: luminance(reflected * found.radiance) / pdf,
+            by_reflection: if found.pdf.is_some() { bsdf_pdf / pdf } else { 0.0 },
+        };
+        Some((value, found))
+    };
+    let step = |i: u32| (i as f32 + 0.5) / POINTS_ALONG as f32;
+    let points = POINTS_ALONG * POINTS_ALONG;
+    let (mut sum, mut middle) = (Contribution::default(), None);
+    for i in 0..points {
+        let u = Vec2::new(step(i % POINTS_ALONG), step(i / POINTS_ALONG));
+        let Some((value, found)) = at(u) else { continue };
+        if found.pdf.is_none() {
+            (sum, middle) = (value, Some(found));
+            break;
+        }
+        sum.luminance += value.luminance / points as f32;
+        sum.by_reflection += value.by_reflection / points as f32;
+        middle = middle.or(Some(found));
+    }
+    if visibility && sum.luminance > 0.0 {
+        let accept = integrator.cutouts(0);
+        let arriving = middle.map(|found| integrator.arriving(&vertex.anchor, &found, &accept));
+        sum.luminance *= arriving.map_or(0.0, luminance);
+    }
+    sum
+}
+
+/// Importances by light, as an exhaustive strategy would use them.
+pub fn shares(importances: Vec<(Picked, f64)>) -> HashMap<Picked, f64> {
+    let total: f64 = importances.iter().map(|(_, importance)| importance).sum();
+    importances.into_iter().map(|(light, importance)| (light, importance / total)).collect()
+}

@@ -1,0 +1,223 @@
+//! Exact variance at points that camera paths visit.
+//!
+//! At each point all lights are enumerated, and the variance of each strategy's estimate of the
+//! light that they reflect there follows in closed form. It is the variance that comes from *which*
+//! lights are picked: what comes from where on a light a sample falls is left out, and so is shadow
+//! unless it is asked for. Light that reflected rays find is left to them, by the weights that a
+//! render has. The ideal is 0.
+
+use super::contributions::{Contributions, shares};
+use crate::light_tree::NoSuchFrame;
+use crate::math::random::{Sampler, hash};
+use crate::render::path::Integrator;
+use crate::render::picker::{LightPicker, PickScratch, Wanted};
+use crate::render::{LightStrategy, RenderDelegate, RenderSettings, SplitBy};
+use rayon::prelude::*;
+use serde::Serialize;
+use std::time::Instant;
+
+/// What to measure.
+#[derive(Clone, Debug)]
+pub struct ProbeOptions {
+    /// How many points.
+    pub probes: u32,
+    /// Whether lights that cannot be seen from a point contribute nothing.
+    pub visibility: bool,
+    /// Knobs of splitting to measure the tree with; each by both tests.
+    pub knobs: Vec<f32>,
+    /// At most so many lights at a point.
+    pub max_lights: u32,
+    /// Another seed, other points.
+    pub seed: u32,
+}
+
+/// What was measured.
+#[derive(Clone, Debug, Serialize)]
+pub struct ProbeReport {
+    /// Points that lights reach.
+    pub probes: usize,
+    /// Lights at each: emitters and those at infinity.
+    pub lights: usize,
+    /// One row a strategy.
+    pub strategies: Vec<StrategyReport>,
+}
+
+/// What one strategy does.
+#[derive(Clone, Debug, Serialize)]
+pub struct StrategyReport {
+    /// Its name.
+    pub strategy: LightStrategy,
+    /// The knob of splitting, if it splits.
+    pub split: Option<f32>,
+    /// The test of splitting, likewise.
+    pub split_by: Option<SplitBy>,
+    /// Variance over squared light, in the mean over all points.
+    pub relative_variance: f64,
+    /// The median over all points.
+    pub median: f64,
+    /// Nine points in ten have less.
+    pub ninth_decile: f64,
+    /// The mean times lights sampled: variance that one sample would have if samples were alike.
+    pub variance_times_lights: f64,
+    /// Lights sampled at a point, in the mean.
+    pub lights: f64,
+    /// Most lights expected at any point.
+    pub most_lights: f64,
+    /// Nanoseconds that picking takes at a point, the median of several rounds. Not repeatable.
+    pub nanoseconds: f64,
+}
+
+/// A point, and what all lights give it.
+struct Probe {
+    wanted: Wanted,
+    glossy: Wanted,
+    contributions: Contributions,
+    sum: f64,
+}
+
+/// Measures all strategies at points that paths from the delegate's camera visit in a frame.
+///
+/// # Errors
+/// If the tree lacks the frame.
+pub fn at_probes<D: AsRef<[u8]> + Sync>(
+    delegate: &RenderDelegate<D>,
+    frame: i32,
+    options: &ProbeOptions,
+) -> Result<ProbeReport, NoSuchFrame> {
+    delegate.at_frame(frame, |integrator| report(integrator, options))
+}
+
+fn report(integrator: &Integrator, options: &ProbeOptions) -> ProbeReport {
+    let probes: Vec<Probe> =
+        (0..options.probes).into_par_iter().filter_map(|i| probe(integrator, i, options)).collect();
+    let mut ways: Vec<(LightStrategy, f32, SplitBy)> = [
+        LightStrategy::Uniform,
+        LightStrategy::Power,
+        LightStrategy::Distance,
+        LightStrategy::Tree,
+    ]
+    .map(|strategy| (strategy, 0.0, SplitBy::Variance))
+    .into();
+    for by in [SplitBy::Variance, SplitBy::SolidAngle] {
+        ways.extend(options.knobs.iter().map(|&knob| (LightStrategy::Tree, knob, by)));
+    }
+    ways.push((LightStrategy::Exhaustive, 0.0, SplitBy::Variance));
+    ways.push((LightStrategy::All, 0.0, SplitBy::Variance));
+    let strategies = ways.into_iter().map(|(strategy, split, split_by)| {
+        let settings = RenderSettings {
+            strategy,
+            split,
+            split_by,
+            max_lights: options.max_lights,
+            ..integrator.settings.clone()
+        };
+        of_strategy(integrator, &settings, &probes)
+    });
+    ProbeReport {
+        probes: probes.len(),
+        lights: integrator.picker.tree().unforced_count() as usize
+            + integrator.infinite.iter().filter(|light| !light.forced).count(),
+        strategies: strategies.collect(),
+    }
+}
+
+/// One point: at the first hit of a path, or, every other one, after a bounce.
+fn probe(integrator: &Integrator, number: u32, options: &ProbeOptions) -> Option<Probe> {
+    let seed = hash(options.seed, number);
+    // Spread over the picture by a lattice of rank 1.
+    let (width, height) = (integrator.settings.width, integrator.settings.height);
+    let x = (number as f32 + 0.5) / options.probes as f32 * width as f32;
+    let y = (f64::from(number) * 0.618_033_988_749_895).fract() as f32 * height as f32;
+    let (x, y) = ((x as u32).min(width - 1), (y as u32).min(height - 1));
+    let vertex = integrator.probe(x, y, seed, number % 2)?;
+    let contributions = Contributions::at(integrator, &vertex, options.visibility);
+    let sum = contributions.sum();
+    let glossy = integrator.glossy(&vertex, &mut Sampler::new(seed, 1));
+    let wanted = Wanted::At(vertex.receiver);
+    (sum > 0.0).then_some(Probe { wanted, glossy, contributions, sum })
+}
+
+fn of_strategy(
+    integrator: &Integrator,
+    settings: &RenderSettings,
+    probes: &[Probe],
+) -> StrategyReport {
+    let tree = integrator.picker.tree().clone();
+    let picker = LightPicker::new(settings, tree, integrator.infinite);
+    let splitting = settings.splitting();
+    let rows: Vec<(f64, f64)> = probes
+        .par_iter()
+        .map(|probe| {
+            let (variance, lights) = of_probe(&picker, settings.strategy, probe);
+            (variance / (probe.sum * probe.sum), lights)
+        })
+        .collect();
+    let mean =
+        |of: fn(&(f64, f64)) -> f64| rows.iter().map(of).sum::<f64>() / rows.len().max(1) as f64;
+    let splits = !splitting.is_off();
+    let mut sorted: Vec<f64> = rows.iter().map(|row| row.0).collect();
+    sorted.sort_unstable_by(f64::total_cmp);
+    let quantile = |share: f64| {
+        let at = (share * sorted.len() as f64) as usize;
+        sorted.get(at.min(sorted.len().saturating_sub(1))).copied().unwrap_or(0.0)
+    };
+    StrategyReport {
+        strategy: settings.strategy,
+        split: splits.then_some(settings.split),
+        split_by: splits.then_some(settings.split_by),
+        relative_variance: mean(|row| row.0),
+        median: quantile(0.5),
+        ninth_decile: quantile(0.9),
+        variance_times_lights: mean(|row| row.0) * mean(|row| row.1),
+        lights: mean(|row| row.1),
+        most_lights: rows.iter().map(|row| row.1).fold(0.0, f64::max),
+        nanoseconds: nanoseconds(&picker, probes),
+    }
+}
+
+/// Variance of the estimate, and how many lights it takes.
+fn of_probe(picker: &LightPicker, strategy: LightStrategy, probe: &Probe) -> (f64, f64) {
+    let wanted = if picker.asks_for_lobe() { &probe.glossy } else { &probe.wanted };
+    match strategy {
+        LightStrategy::All => (0.0, f64::from(picker.count())),
+        LightStrategy::Tree | LightStrategy::Distance => {
+            let moments =
+                picker.moments(wanted, &|light, expected| probe.contributions.of(light, expected));
+            (moments.variance, moments.lights)
+        }
+        LightStrategy::Exhaustive => {
+            let mut importances = Vec::new();
+            picker.for_each_importance(wanted, |light, importance| {
+                importances.push((light, importance));
+            });
+            let shares = shares(importances);
+            let share = |light| shares.get(&light).copied().unwrap_or(0.0);
+            (probe.contributions.variance_of_one(share), 1.0)
+        }
+        LightStrategy::Uniform | LightStrategy::Power => {
+            let share = |light| picker.blind_probability(light);
+            (probe.contributions.variance_of_one(share), 1.0)
+        }
+    }
+}
+
+/// What picking takes at a point.
+fn nanoseconds(picker: &LightPicker, probes: &[Probe]) -> f64 {
+    const ROUNDS: usize = 9;
+    let mut scratch = PickScratch::default();
+    let mut times: Vec<f64> = (0..ROUNDS as u32)
+        .map(|round| {
+            let started = Instant::now();
+            let mut picked = 0u32;
+            for (number, probe) in (0..).zip(probes) {
+                let wanted = if picker.asks_for_lobe() { &probe.glossy } else { &probe.wanted };
+                let u = (hash(round, number) >> 8) as f32 / 16_777_216.0;
+                picker.pick(wanted, u, number, &mut scratch, |_| picked += 1);
+            }
+            std::hint::black_box(picked);
+            started.elapsed().as_nanos() as f64 / probes.len().max(1) as f64
+        })
+        .collect();
+    times.sort_unstable_by(f64::total_cmp);
+    times[ROUNDS / 2]
+}

@@ -1,0 +1,105 @@
+//! Settings against each other: what each takes to get how close.
+//!
+//! Every entrant renders the same frame several times with other seeds. All pictures have the same
+//! mean, so the spread between them is the error, without any reference; and the time to reach
+//! another's error follows, since error times time stays the same as samples are added (stratified
+//! samples do better than that, so entrants are best given about the samples that they need).
+
+use crate::light_tree::NoSuchFrame;
+use crate::math::color::luminance;
+use crate::render::{RenderDelegate, RenderSettings};
+use serde::Serialize;
+use std::time::Instant;
+
+/// One that takes part.
+#[derive(Clone, Debug)]
+pub struct Entrant {
+    /// What it is called.
+    pub name: String,
+    /// How it renders.
+    pub settings: RenderSettings,
+}
+
+/// How the race is run.
+#[derive(Clone, Copy, Debug)]
+pub struct RaceOptions {
+    /// The frame.
+    pub frame: i32,
+    /// Pictures by each, at least 2.
+    pub pictures: u32,
+}
+
+/// How one did.
+#[derive(Clone, Debug, Serialize)]
+pub struct Result {
+    /// What it is called.
+    pub name: String,
+    /// Seconds for a picture, the median.
+    pub seconds: f64,
+    /// Mean over the pixels of variance over squared luminance (and a hundredth of the mean's).
+    pub error: f64,
+    /// Seconds that it would take to the error of the first.
+    pub seconds_to_error_of_first: f64,
+    /// The picture's mean luminance, which all should agree in.
+    pub mean: f64,
+    /// Lights sampled for a path, in the mean.
+    pub lights: f64,
+}
+
+/// Runs a race. `done` is called after every picture.
+///
+/// # Errors
+/// If the tree lacks the frame.
+pub fn race<D: AsRef<[u8]> + Sync>(
+    delegate: &mut RenderDelegate<D>,
+    entrants: &[Entrant],
+    options: &RaceOptions,
+    mut done: impl FnMut(),
+) -> std::result::Result<Vec<Result>, NoSuchFrame> {
+    let mut results: Vec<Result> = Vec::new();
+    for entrant in entrants {
+        let mut times = Vec::new();
+        let mut sums: Vec<[f64; 2]> = Vec::new();
+        let mut lights = 0;
+        for picture in 0..options.pictures.max(2) {
+            let seed = entrant.settings.seed.wrapping_add(picture);
+            delegate.set_settings(RenderSettings { seed, ..entrant.settings.clone() });
+            let started = Instant::now();
+            let rendered = delegate.render(options.frame, &())?;
+            times.push(started.elapsed().as_secs_f64());
+            lights += rendered.stats.light_picks;
+            let pixels = rendered.buffers.pixels();
+            sums.resize(pixels.len(), [0.0; 2]);
+            for (sum, pixel) in sums.iter_mut().zip(pixels) {
+                let value = f64::from(luminance(pixel.beauty));
+                sum[0] += value;
+                sum[1] += value * value;
+            }
+            done();
+        }
+        times.sort_unstable_by(f64::total_cmp);
+        let count = times.len() as f64;
+        let mean = sums.iter().map(|sum| sum[0]).sum::<f64>() / (count * sums.len() as f64);
+        let floor = (0.01 * mean).powi(2).max(f64::MIN_POSITIVE);
+        let error = sums.iter().map(|[sum, squares]| {
+            let own = sum / count;
+            let variance = (squares - sum * own).max(0.0) / (count - 1.0);
+            variance / (own * own + floor)
+        });
+        let error = error.sum::<f64>() / sums.len() as f64;
+        let seconds = times[times.len() / 2];
+        let settings = &entrant.settings;
+        let paths = f64::from(settings.width) * f64::from(settings.height);
+        let paths = paths * f64::from(settings.samples) * count;
+        let goal = results.first().map_or(error, |first| first.error);
+        results.push(Result {
+            name: entrant.name.clone(),
+            seconds,
+            error,
+            seconds_to_error_of_first: seconds * error / goal,
+            mean,
+            lights: lights as f64 / paths,
+        });
+    }
+    Ok(results)
+}

@@ -1,0 +1,151 @@
+//! Next-event estimation: light from the lights that are picked for a point of a surface.
+
+use super::path::{Integrator, PathScratch, Vertex};
+use super::picker::{LightPick, Wanted};
+use super::rays::Anchor;
+use crate::light_tree::Picked;
+use crate::math::color::Rgb;
+use crate::math::random::hash;
+use glam::{Vec2, Vec3};
+
+/// Light that may arrive at a point, if nothing is in its way.
+pub struct Incoming {
+    /// Unit, from the point.
+    pub direction: Vec3,
+    /// Nits; lux of a facing surface if `pdf` is `None`.
+    pub radiance: Rgb,
+    /// Density over solid angle, 1/sr; `None` for a direction or point that no ray can hit.
+    pub pdf: Option<f32>,
+    /// Where it comes from; `None` from infinity.
+    pub from: Option<Anchor>,
+}
+
+impl Integrator<'_> {
+    /// Light from the lights picked for a vertex. The numbers are one for picking, two for points on
+    /// lights, and one that stands for the place.
+    pub(super) fn direct(
+        &self,
+        vertex: &Vertex,
+        wanted: &Wanted,
+        (u_pick, u, salt): (f32, Vec2, u32),
+        accept: &impl Fn(u32, u32, Vec2) -> bool,
+        scratch: &mut PathScratch,
+    ) -> Rgb {
+        let mut sum = Rgb::ZERO;
+        let PathScratch { picks, stats } = scratch;
+        let several = self.picker.takes_several();
+        self.picker.pick(wanted, u_pick, salt, picks, |pick| {
+            stats.light_picks += 1;
+            let u = if several { another(u, salt, pick.light) } else { u };
+            let incoming =
+                self.incoming(pick.light, vertex.receiver.point, vertex.receiver.normal, u);
+            let Some(incoming) = incoming else { return };
+            let reflected = self.reflected(vertex, &pick, &incoming);
+            if reflected == Rgb::ZERO {
+                return;
+            }
+            stats.rays += 1;
+            sum += reflected * self.arriving(&vertex.anchor, &incoming, accept);
+        });
+        sum
+    }
+
+    /// What a vertex reflects of some light, if nothing is in its way, over the density of having
+    /// found it and weighed against finding it by reflection.
+    fn reflected(&self, vertex: &Vertex, pick: &LightPick, incoming: &Incoming) -> Rgb {
+        if !vertex.lets_through(incoming.direction) {
+            return Rgb::ZERO;
+        }
+        let (reflected, bsdf_pdf) = vertex.bsdf.eval(vertex.wo, incoming.direction);
+        let probability = pick.probability as f32;
+        match incoming.pdf {
+            None => reflected * incoming.radiance / probability,
+            Some(pdf) => {
+                let expected = pick.expected as f32 * pdf;
+                let weight =
+                    if self.settings.mis { power_heuristic(expected, bsdf_pdf) } else { 1.0 };
+                reflected * incoming.radiance * (weight / (probability * pdf))
+            }
+        }
+    }
+
+    /// Light from a point of a picked light towards a point; with a normal, of which light comes
+    /// from one side only (zero: from any).
+    pub fn incoming(&self, light: Picked, point: Vec3, normal: Vec3, u: Vec2) -> Option<Incoming> {
+        let emitter = match light {
+            Picked::Emitter(emitter) => emitter,
+            Picked::Beside(row) => {
+                let s = self.infinite[row as usize].sample(normal, u)?;
+                let (direction, radiance, pdf) = (s.direction, s.radiance, s.pdf);
+                return Some(Incoming { direction, radiance, pdf, from: None });
+            }
+        };
+        let s = self.emitters.sample(emitter, point, u)?;
+        let coverage = s.on_mesh.map_or(1.0, |place| {
+            self.surfaces.coverage(place.instance, place.triangle, place.barycentric)
+        });
+        let from = if s.normal == Vec3::ZERO {
+            Anchor::free(s.point)
+        } else {
+            Anchor::computed(s.point, s.normal, s.magnitude_m)
+        };
+        Some(Incoming {
+            direction: s.direction,
+            radiance: s.radiance * coverage,
+            pdf: s.pdf,
+            from: Some(from),
+        })
+    }
+
+    /// The share of light that gets from where it comes from to a point: none if anything stands in
+    /// its way, and what fog lets through.
+    pub fn arriving(
+        &self,
+        at: &Anchor,
+        incoming: &Incoming,
+        accept: &impl Fn(u32, u32, Vec2) -> bool,
+    ) -> Rgb {
+        let direction = incoming.direction;
+        let (blocked, length) = match &incoming.from {
+            Some(light) => (
+                self.tracer.occluded_between(at, light, accept),
+                (light.position - at.position).length(),
+            ),
+            None => {
+                let origin = at.origin_toward(direction);
+                (self.tracer.occluded(origin, direction, f32::INFINITY, accept), f32::INFINITY)
+            }
+        };
+        if blocked {
+            return Rgb::ZERO;
+        }
+        let through = |fog: &super::fog::Fog| fog.transmittance(at.position, direction, length);
+        self.fog.as_ref().map_or(Rgb::ONE, through)
+    }
+}
+
+/// Numbers of its own for each of several lights, turned by an amount that depends on the place and
+/// the light alone, so that the samples of a place stay stratified for each light.
+pub(super) fn another(u: Vec2, salt: u32, light: Picked) -> Vec2 {
+    let code = match light {
+        Picked::Emitter(emitter) => emitter,
+        Picked::Beside(row) => !row,
+    };
+    let word = hash(salt ^ 0x5bd1_e995, code);
+    let turn = |bits: u32| (bits & 0xffff) as f32 / 65536.0;
+    let turned = u + Vec2::new(turn(word), turn(word >> 16));
+    (turned - turned.floor()).min(Vec2::splat(BELOW_ONE))
+}
+
+/// The largest number below 1.
+const BELOW_ONE: f32 = 1.0 - f32::EPSILON / 2.0;
+
+/// Veach's power heuristic with exponent 2, safe where squares would overflow.
+pub fn power_heuristic(own: f32, other: f32) -> f32 {
+    if own > 0.0 {
+        let ratio = other / own;
+        1.0 / (1.0 + ratio * ratio)
+    } else {
+        0.0
+    }
+}

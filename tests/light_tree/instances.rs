@@ -1,0 +1,206 @@
+//! Trees below trees: shared ones that are turned, mirrored and scaled, the one of what stands still
+//! below the one of a frame, and forced lights.
+
+use crate::city::{City, Part, city};
+use crate::support::{
+    AnyViewer, Tree, any_viewer, can_light, dead_probability_in, for_viewer, receiver, tree_over,
+};
+use candelabra::bounds::{Aabb, Cone, LightBounds};
+use candelabra::light_tree::{FrameTree, Link, Receiver, TreeKind};
+use candelabra::math::random::hash;
+use glam::Vec3;
+use proptest::prelude::*;
+
+fn with_frame<T>(tree: &Tree, frame: i32, check: impl FnOnce(&FrameTree) -> T) -> T {
+    let table = tree.leaf_table();
+    check(&tree.at_frame(frame, &table).unwrap())
+}
+
+/// The row of the tree that frame 1 samples.
+fn row_of_frame(tree: &Tree) -> Option<u32> {
+    match tree.frames() {
+        [frame, ..] => Some(frame.tree),
+        [] => {
+            let is_still = |row: &_| TreeKind::of(row) == Some(TreeKind::Still);
+            tree.trees().iter().position(is_still).map(|row| row as u32)
+        }
+    }
+}
+
+/// The city with points instead of boxes, spots that are not too narrow, and no ranges: what the tree
+/// is told of them is exact but for the rounding of directions.
+fn sharpened(city: &City) -> City {
+    let point = |b: &LightBounds| LightBounds {
+        aabb: Aabb::around([b.aabb.center()]),
+        cone: Cone { theta_e: b.cone.theta_e.max(0.3), ..b.cone },
+        range_m: f32::INFINITY,
+        ..*b
+    };
+    let all = |bounds: &Vec<LightBounds>| bounds.iter().map(point).collect();
+    let part = |part: &Part| Part { flat: all(&part.flat), placed: part.placed.clone() };
+    City {
+        shared: city.shared.iter().map(all).collect(),
+        still: part(&city.still),
+        changing: part(&city.changing),
+        forced: city.forced.clone(),
+    }
+}
+
+proptest! {
+    #[test]
+    fn trees_below_trees_verify(city in city(), factors in prop::collection::vec(0.01f32..100.0, 5)) {
+        prop_assert_eq!(city.tree().verify(), Ok(()));
+        prop_assert_eq!(city.tree_with_second_frame(&factors).0.verify(), Ok(()));
+    }
+
+    #[test]
+    fn probabilities_sum_to_one_through_instances(city in city(), receiver in receiver()) {
+        let tree = city.tree();
+        let Some(row) = row_of_frame(&tree) else { return Ok(()) };
+        let dead = dead_probability_in(&tree, row, &receiver);
+        with_frame(&tree, 1, |frame| {
+            let all = 0..frame.unforced_count();
+            let sum: f64 = all.map(|emitter| frame.probability(&receiver, emitter)).sum();
+            prop_assert!((sum + dead - 1.0).abs() < 1e-9, "{sum} + {dead}");
+            Ok(())
+        })?;
+    }
+
+    #[test]
+    fn a_pick_has_the_probability_it_says_through_instances(
+        city in city(), viewer in any_viewer()
+    ) {
+        with_frame(&city.tree(), 1, |frame| for_viewer!(viewer, |v| {
+            for i in 0..64 {
+                let u = (f64::from(i) + 0.5) / 64.0;
+                if let Some(pick) = frame.sample(&v, u) {
+                    let emitter = pick.light.emitter().unwrap();
+                    let told = frame.probability(&v, emitter);
+                    prop_assert!(emitter < frame.unforced_count(), "a forced light was picked");
+                    prop_assert!((pick.probability - told).abs() <= 1e-12 * told);
+                    prop_assert!((0.0..1.0).contains(&pick.leftover));
+                }
+            }
+            Ok(())
+        }))?;
+    }
+
+    #[test]
+    fn what_lights_a_point_has_a_probability_through_instances(
+        city in city(), receiver in receiver()
+    ) {
+        with_frame(&city.tree(), 1, |frame| {
+            for (emitter, bounds) in (0..).zip(city.flattened()) {
+                // The box of a turned box is wider than what is in it.
+                let exact = LightBounds { aabb: Aabb::around([bounds.aabb.center()]), ..bounds };
+                prop_assert!(
+                    frame.probability(&receiver, emitter) > 0.0 || !can_light(&exact, &receiver),
+                    "{emitter}"
+                );
+            }
+            Ok(())
+        })?;
+    }
+
+    /// Lights that are points are lit through an instance just where they are lit on their own; at the
+    /// edges of cones and at the horizon, rounding decides.
+    #[test]
+    fn instances_light_what_their_lights_light_on_their_own(
+        city in city(), receiver in receiver()
+    ) {
+        let city = sharpened(&city);
+        let flat = city.flattened();
+        let is_edge = |b: &LightBounds| {
+            let with = |by: f32| {
+                let theta_e = b.cone.theta_e + by;
+                can_light(&LightBounds { cone: Cone { theta_e, ..b.cone }, ..*b }, &receiver)
+            };
+            let up = (b.aabb.center() - receiver.point).normalize_or_zero().dot(receiver.normal);
+            with(0.03) != with(-0.03) || (up.abs() < 1e-3 && receiver.normal != Vec3::ZERO)
+        };
+        let alone = tree_over(&flat);
+        with_frame(&city.tree(), 1, |placed| with_frame(&alone, 1, |alone| {
+            for (emitter, bounds) in (0..).zip(&flat).filter(|(_, bounds)| !is_edge(bounds)) {
+                let [a, b] = [placed, alone].map(|tree| tree.probability(&receiver, emitter) > 0.0);
+                prop_assert_eq!(a, b, "{}", emitter);
+                prop_assert_eq!(a, can_light(bounds, &receiver), "{}", emitter);
+            }
+            Ok(())
+        }))?;
+    }
+
+    #[test]
+    fn forced_lights_are_sampled_on_their_own_and_picked_by_no_one(
+        city in city(), receiver in receiver()
+    ) {
+        let tree = city.tree();
+        with_frame(&tree, 1, |frame| {
+            prop_assert_eq!(frame.forced_count(), city.forced.len());
+            let mut first = frame.unforced_count();
+            for (light, placed) in city.forced.iter().enumerate() {
+                let own = first..first + city.shared[placed.tree].len() as u32;
+                first = own.end;
+                let row = tree.forced()[light] as usize;
+                let there = candelabra::light_tree::Viewer::within(
+                    &receiver, &tree.instances()[row].to_local,
+                );
+                let dead = dead_probability_in(&tree, placed.tree as u32, &there);
+                let sum: f64 = own.clone().map(|e| frame.probability(&receiver, e)).sum();
+                prop_assert!((sum + dead - 1.0).abs() < 1e-9, "{sum} + {dead}");
+                for i in 0..32u32 {
+                    let u = f64::from(hash(i, 9)) / 4_294_967_296.0;
+                    let Some(pick) = frame.sample_forced(light, &receiver, u) else { continue };
+                    let emitter = pick.light.emitter().unwrap();
+                    let told = frame.probability(&receiver, emitter);
+                    prop_assert!(own.contains(&emitter));
+                    prop_assert!((pick.probability - told).abs() <= 1e-12 * told);
+                }
+            }
+            prop_assert!(frame.sample_forced(city.forced.len(), &receiver, 0.5).is_none());
+            prop_assert_eq!(first as usize, tree.emitter_count());
+            Ok(())
+        })?;
+    }
+
+    /// A frame that differs in brightness alone has the clusters of the frame before, and its own
+    /// energies, summed up to the root.
+    #[test]
+    fn new_energies_leave_the_boxes_alone(
+        city in city(), factors in prop::collection::vec(0.01f32..100.0, 1..9)
+    ) {
+        let (tree, energies) = city.tree_with_second_frame(&factors);
+        let [.., first, second] = tree.trees() else { return Ok(()) };
+        if tree.frames().len() < 2 {
+            return Ok(());
+        }
+        let of = |link| energies.iter().find(|(leaf, _)| *leaf == link).map(|(_, energy)| *energy);
+        for (a, b) in tree.groups_of(first).iter().zip(tree.groups_of(second)) {
+            for (a, b) in a.nodes().zip(b.nodes()) {
+                let (a, b) = ((a.bounds(), a.link()), (b.bounds(), b.link()));
+                prop_assert_eq!(LightBounds { energy: b.0.energy, ..a.0 }, b.0);
+                prop_assert_eq!(a.1, b.1);
+                if !matches!(b.1, Link::Inner(_)) {
+                    prop_assert_eq!(Some(b.0.energy), of(b.1));
+                }
+            }
+        }
+        let sum: f64 = energies.iter().map(|(_, energy)| f64::from(*energy)).sum();
+        let told = f64::from(second.root.energy());
+        prop_assert!((told - sum).abs() <= 1e-6 * sum, "{told} {sum}");
+    }
+
+    #[test]
+    fn a_frame_over_what_stands_still_samples_both(city in city()) {
+        let tree = city.tree();
+        let Some(row) = row_of_frame(&tree) else { return Ok(()) };
+        let everywhere = Receiver { point: Vec3::splat(40.0), normal: Vec3::ZERO };
+        with_frame(&tree, 1, |frame| {
+            let root = frame.root().unwrap();
+            prop_assert_eq!(root.energy(), tree.trees()[row as usize].root.energy());
+            let mut counts = vec![0; frame.unforced_count() as usize];
+            frame.for_each_leaf(&everywhere, |emitter, _, _| counts[emitter as usize] += 1);
+            prop_assert!(counts.iter().all(|&count| count == 1), "{counts:?}");
+            Ok(())
+        })?;
+    }
+}
