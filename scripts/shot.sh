@@ -19,7 +19,7 @@ echo "== building the light tree"
 "$release/candelabra" build "out/$shot.glb" -o "out/$shot.ltree"
 echo "== rendering"
 "$release/candelabra-render" "out/$shot.glb" --tree "out/$shot.ltree" \
-    --frames "${FRAMES:-1001-1024}" --res "${RES:-480x270}" --spp "${SPP:-32}" \
+    --frames "${FRAMES:-1001-1024}" --res "${RES:-480x270}" --spp "${SPP:-8}" \
     --output "out/$shot.####.exr" --png --exposure 0 --resume
 "$python" scripts/contact_sheet.py "out/$shot".[0-9]*.png --output out/contact_sheet.png
 

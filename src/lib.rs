@@ -9,13 +9,13 @@
 //!
 //! # A tour
 //!
-//! The house has seven floors; a room imports only from floors below its own. (Floor 4, `measure`,
-//! which runs strategies side by side, is not built yet.)
+//! The house has seven floors; a room imports only from floors below its own.
 //!
 //! | floor | rooms | |
 //! |---|---|---|
 //! | 6 | `bin/candelabra`, `bin/candelabra-render` | arguments, progress, exit codes |
 //! | 5 | [`pipeline`] | jobs and stages: the only place where ingest meets the tree |
+//! | 4 | [`measure`] | strategies side by side: exact variance, error against time |
 //! | 3 | [`render`] | a path tracer that finds its lights through the tree |
 //! | 2 | [`ingest`], [`emitter`], [`light_tree`] | files to scene; scene to emitters; bounds to tree |
 //! | 1 | [`scene`], [`bounds`], [`store`] | a scene's tables; box, cone, energy; bytes on disk |

@@ -8,6 +8,7 @@
 //!
 //! This room does not know the tree; which emitter to sample is decided elsewhere.
 
+mod beam;
 mod bounding;
 mod dome;
 mod infinite;

@@ -33,14 +33,16 @@ impl Picked {
     }
 }
 
-/// The relative variance of one sample of a light beside the tree: shadows that no estimate knows of.
-const SPREAD_BESIDE: f64 = 0.1;
+/// The part in the relative variance that no opening removes: shadows and reflections that no estimate
+/// knows of.
+const UNKNOWN: f64 = 0.04;
 
 /// Room for a cut and for walks below it, to be used again and again.
 #[derive(Debug)]
 pub struct Scratch<V> {
     pub(super) entries: Vec<Entry<V>>,
     weights: Vec<f64>,
+    caps: Vec<f64>,
     pub(super) low: Vec<f64>,
     pub(super) high: Vec<f64>,
     open: Vec<Opened<V>>,
@@ -48,8 +50,8 @@ pub struct Scratch<V> {
 
 impl<V> Default for Scratch<V> {
     fn default() -> Self {
-        let (weights, low, high) = Default::default();
-        Scratch { entries: Vec::new(), weights, low, high, open: Vec::new() }
+        let (weights, caps, low, high) = Default::default();
+        Scratch { entries: Vec::new(), weights, caps, low, high, open: Vec::new() }
     }
 }
 
@@ -70,6 +72,8 @@ struct Opened<V> {
     weight: f64,
     /// How far it is opened, from 0 to 1: how much of what its parts say counts.
     opened: f64,
+    /// At most so many samples it had before it was opened.
+    cap: f64,
 }
 
 /// A cut, allotted.
@@ -93,13 +97,16 @@ impl FrameTree<'_> {
         route: Option<&Route>,
         scratch: &mut Scratch<V>,
     ) -> Option<Cut> {
-        let Scratch { entries, weights, low, high, open } = scratch;
-        (entries.clear(), weights.clear(), open.clear());
+        let Scratch { entries, weights, caps, low, high, open } = scratch;
+        entries.clear();
+        weights.clear();
+        caps.clear();
+        open.clear();
         let mut variance = 0.0;
         for (row, &importance) in (0..).zip(beside) {
             entries.push(Entry::Light(Picked::Beside(row)));
             weights.push(importance);
-            variance += importance * SPREAD_BESIDE;
+            caps.push(1.0);
         }
         let mut wanted = None;
         let root = self.total_importance(viewer);
@@ -111,14 +118,15 @@ impl FrameTree<'_> {
             let mut total = root + beside.iter().sum::<f64>();
             let mut may_open = !how.is_off();
             if may_open {
-                open.push(Opened { place, leg, weight: root, opened: 1.0 });
+                open.push(Opened { place, leg, weight: root, opened: 1.0, cap: 1.0 });
             } else {
                 entries.push(Entry::Cluster(place));
                 weights.push(root);
+                caps.push(1.0);
                 wanted = leg.map(|leg| (entries.len() - 1, leg));
             }
             let mut is_first = true;
-            while let Some(Opened { place, leg, weight, opened }) = open.pop() {
+            while let Some(Opened { place, leg, weight, opened, cap }) = open.pop() {
                 let Some(group) = self.group(&place) else { continue };
                 let (mut importances, spreads) = group.weigh(&place.viewer);
                 let sum: f64 = importances.iter().sum();
@@ -129,6 +137,7 @@ impl FrameTree<'_> {
                     total = sum + beside.iter().sum::<f64>();
                     is_first = false;
                 }
+                let weighed = importances;
                 if opened < 1.0 {
                     let scale = opened + (1.0 - opened) * weight / sum;
                     importances.iter_mut().for_each(|importance| *importance *= scale);
@@ -146,6 +155,8 @@ impl FrameTree<'_> {
                     if importance <= 0.0 {
                         continue;
                     }
+                    // Barely opened, all parts together still have no more than what they are part of.
+                    let cap = opened + (1.0 - opened) * cap * weighed[lane] / sum;
                     let leg = on_route.filter(|&(own, _)| own == lane).map(|(_, leg)| leg);
                     let (entry, part) = match self.follow(&place, group.link(lane)) {
                         None => continue,
@@ -166,7 +177,13 @@ impl FrameTree<'_> {
                                 let further = opened * excess.min(1.0);
                                 variance += (opened - further) * part;
                                 let weight = importance;
-                                open.push(Opened { place: below, leg, weight, opened: further });
+                                open.push(Opened {
+                                    place: below,
+                                    leg,
+                                    weight,
+                                    opened: further,
+                                    cap,
+                                });
                                 continue;
                             }
                             (Entry::Cluster(below), opened * part)
@@ -177,6 +194,7 @@ impl FrameTree<'_> {
                     }
                     entries.push(entry);
                     weights.push(importance);
+                    caps.push(cap);
                     variance += part;
                 }
                 // The seed's rule samples all of the cut: then its size is what is capped.
@@ -189,10 +207,10 @@ impl FrameTree<'_> {
             return None;
         }
         let alive = weights.iter().filter(|&&weight| weight > 0.0).count();
-        let rounded = Rounded::new(how.worth(variance / total, alive));
-        allot(weights, rounded.low, low);
+        let rounded = Rounded::new(how.worth(variance / total + UNKNOWN, alive));
+        allot(weights, caps, rounded.low, low);
         if rounded.chance_of_more > 0.0 {
-            allot(weights, rounded.low + 1, high);
+            allot(weights, caps, rounded.low + 1, high);
         }
         Some(Cut { rounded, wanted })
     }

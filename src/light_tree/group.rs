@@ -5,9 +5,10 @@
 //! intermediate cluster blurs it; and a smaller file, because the intermediate clusters are gone.
 //! Fields are kept apart, lane by lane, as vector instructions want them.
 
-use super::importance::{Cluster, Factors, importance};
+use super::importance::{Cluster, importance};
 use super::node::{self, Link, Node};
 use super::viewer::Viewer;
+use super::wide;
 use bytemuck::{Pod, Zeroable};
 use std::array::from_fn;
 
@@ -142,16 +143,25 @@ impl Group {
     /// The importance of each lane to a viewer, and how uncertain each is.
     #[inline]
     pub(super) fn weigh(&self, viewer: &impl Viewer) -> ([f64; WIDTH], [f32; WIDTH]) {
+        wide::weigh(self, viewer)
+    }
+
+    #[inline(always)]
+    pub(super) fn weigh_lanes(&self, viewer: &impl Viewer) -> ([f64; WIDTH], [f32; WIDTH]) {
+        // Lane by lane, each quantity in an array of its own: so the compiler computes all lanes
+        // together.
+        let (mut products, mut decays, mut spreads) = ([0.0; WIDTH], [0.0; WIDTH], [0.0; WIDTH]);
         let lanes = self.decode();
-        let mut factors = [Factors { product: 0.0, decay: 0.0, spread: 0.0 }; WIDTH];
-        for (lane, factors) in factors.iter_mut().enumerate() {
-            *factors = viewer.factors(&lanes.cluster(lane));
+        for lane in 0..WIDTH {
+            let factors = viewer.factors(&lanes.cluster(lane));
+            (products[lane], decays[lane]) = (factors.product, factors.decay);
+            spreads[lane] = factors.spread;
         }
         let mut weights = [0.0; WIDTH];
         for lane in 0..WIDTH {
-            weights[lane] = importance(self.energy(lane), &factors[lane]);
+            weights[lane] = importance(self.energy(lane), products[lane], decays[lane]);
         }
-        (weights, factors.map(|factors| factors.spread))
+        (weights, spreads)
     }
 }
 

@@ -172,8 +172,8 @@ pub(super) fn factors(cluster: &Cluster, receiver: &Receiver) -> Factors {
 /// Energy times cosines over squared distance, in double precision: energies and distances may
 /// span more than `f32` does.
 #[inline(always)]
-pub(super) fn importance(energy: f32, factors: &Factors) -> f64 {
+pub(super) fn importance(energy: f32, product: f32, decay: f32) -> f64 {
     /// Below every distance that `f32` squares, above nothing at all.
     const LEAST: f64 = 1e-60;
-    f64::from(energy) * f64::from(factors.product) / (f64::from(factors.decay) + LEAST)
+    f64::from(energy) * f64::from(product) / (f64::from(decay) + LEAST)
 }

@@ -13,6 +13,7 @@
 //! | `group` | the eight children of a cluster, lane by lane |
 //! | `viewer` | who asks: a [`Receiver`], or a stretch of a ray ([`Segment`]) |
 //! | `importance`, `segment` | what a cluster may send to each |
+//! | `wide` | the same code for wider vector registers |
 //! | `builder` | the partition (SAOH) and the bounds, deterministic and parallel |
 //! | `writer`, `records`, `tree` | the trees of a shot as a file, and that file opened |
 //! | `sampling` | picking an emitter |
@@ -38,6 +39,7 @@ mod tree;
 mod variance;
 mod verify;
 mod viewer;
+mod wide;
 mod writer;
 
 pub use builder::ALGORITHM_VERSION;

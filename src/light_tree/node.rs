@@ -178,7 +178,8 @@ impl Node {
     /// Importance of this cluster to a viewer: an estimate of the irradiance from it, in the scene's
     /// units; 0 only where none of its light can arrive.
     pub fn importance(&self, viewer: &impl Viewer) -> f64 {
-        importance(self.energy(), &viewer.factors(&self.cluster()))
+        let factors = viewer.factors(&self.cluster());
+        importance(self.energy(), factors.product, factors.decay)
     }
 }
 

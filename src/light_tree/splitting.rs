@@ -34,11 +34,11 @@ pub enum SplitTest {
 }
 
 /// At half a turn of the knob: the part in the relative variance above which a cluster is opened...
-const OPENED_ABOVE: f64 = 0.02;
+const OPENED_ABOVE: f64 = 0.007;
 /// ...and the relative variance that is worth one more sample.
-const WORTH_A_SAMPLE: f64 = 0.04;
+const WORTH_A_SAMPLE: f64 = 0.013;
 /// The seed's measure above which a cluster is split at half a turn.
-const GLARE: f64 = 0.2;
+const GLARE: f64 = 2.0;
 
 impl Splitting {
     /// One sample at a point, by a plain descent.
@@ -81,33 +81,37 @@ impl Splitting {
 /// The largest number below 1.
 pub(super) const BELOW_ONE: f64 = 1.0 - f64::EPSILON / 2.0;
 
-/// Gives so many of some clusters a sample: each with a chance in proportion to its weight, or surely
-/// where that would be above 1. The chances add up to the count, or to the number of weights that are
-/// not zero if there are no more.
-pub(super) fn allot(weights: &[f64], count: u32, chances: &mut Vec<f64>) {
+/// Gives at most so many of some clusters a sample: each with a chance in proportion to its weight, but
+/// not above its cap, which is 1 or less. The chances add up to the count, or to all caps of weights
+/// that are not zero if that is less.
+pub(super) fn allot(weights: &[f64], caps: &[f64], count: u32, chances: &mut Vec<f64>) {
     chances.clear();
-    let alive = weights.iter().filter(|&&weight| weight > 0.0).count();
-    if count as usize >= alive {
-        chances.extend(weights.iter().map(|&weight| if weight > 0.0 { 1.0 } else { 0.0 }));
+    if weights.iter().filter(|&&weight| weight > 0.0).count() <= count as usize {
+        let all = weights.iter().zip(caps);
+        chances.extend(all.map(|(&weight, &cap)| if weight > 0.0 { cap } else { 0.0 }));
         return;
     }
     chances.resize(weights.len(), 0.0);
-    // Those that are sure take one sample each; what is left goes to the others.
-    let mut sure = 0;
+    // Those at their caps keep them; what is left goes to the others.
+    let mut left = f64::from(count);
     loop {
-        let is_sure = |chance: f64| chance >= 1.0;
-        let others = weights.iter().zip(chances.iter()).filter(|(_, chance)| !is_sure(**chance));
-        let sum: f64 = others.map(|(weight, _)| weight).sum();
-        let each = f64::from(count - sure) / sum;
-        let mut more = 0;
-        for (weight, chance) in weights.iter().zip(chances.iter_mut()) {
-            if !is_sure(*chance) {
-                *chance = (weight * each).min(1.0);
-                more += u32::from(is_sure(*chance));
+        let alive = || weights.iter().zip(caps).zip(chances.iter());
+        let sum: f64 = alive().filter(|((_, cap), chance)| chance < cap).map(|((w, _), _)| w).sum();
+        if sum <= 0.0 || left <= 0.0 {
+            return;
+        }
+        let each = left / sum;
+        let mut more = false;
+        for ((&weight, &cap), chance) in weights.iter().zip(caps).zip(chances.iter_mut()) {
+            if weight > 0.0 && *chance < cap {
+                *chance = weight * each;
+                if *chance >= cap {
+                    (*chance, more) = (cap, true);
+                    left -= cap;
+                }
             }
         }
-        sure += more;
-        if more == 0 || sure >= count {
+        if !more {
             return;
         }
     }
@@ -120,10 +124,10 @@ pub(super) fn allot(weights: &[f64], count: u32, chances: &mut Vec<f64>) {
 pub(super) fn comb(chances: &[f64], u: f64) -> impl Iterator<Item = (usize, f64)> + '_ {
     let mut end = 0.0;
     // The comb's teeth stand at u, u + 1, ...; `next` is the first that no cluster has met. There are
-    // as many as the chances add up to, also where rounding leaves room for one more.
+    // no more than the chances add up to, also where rounding leaves room for another.
     let mut next = u;
     let open: f64 = chances.iter().filter(|&&chance| chance < 1.0).sum();
-    let last = u + open.round();
+    let last = u + (open - 1e-9).ceil();
     chances.iter().enumerate().filter_map(move |(i, &chance)| {
         if chance <= 0.0 {
             return None;
@@ -172,31 +176,36 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    fn weights() -> impl Strategy<Value = Vec<f64>> {
+    /// Weights and caps.
+    fn clusters() -> impl Strategy<Value = (Vec<f64>, Vec<f64>)> {
         let weight = prop_oneof![1 => Just(0.0), 4 => 1e-6..1.0, 1 => 1.0..1e6];
-        prop::collection::vec(weight, 1..40)
+        let cap = prop_oneof![3 => Just(1.0), 1 => 0.01..1.0];
+        prop::collection::vec((weight, cap), 1..40).prop_map(|pairs| pairs.into_iter().unzip())
     }
 
     proptest! {
         #[test]
-        fn chances_add_up_to_the_count(weights in weights(), count in 1u32..50) {
-            let alive = weights.iter().filter(|&&w| w > 0.0).count() as u32;
+        fn chances_add_up_to_the_count((weights, caps) in clusters(), count in 1u32..50) {
+            let alive = weights.iter().zip(&caps).filter(|(w, _)| **w > 0.0);
+            let most: f64 = alive.map(|(_, cap)| cap).sum();
             let mut chances = Vec::new();
-            allot(&weights, count, &mut chances);
+            allot(&weights, &caps, count, &mut chances);
             let sum: f64 = chances.iter().sum();
-            prop_assert!((sum - f64::from(count.min(alive))).abs() < 1e-9, "{sum}");
-            for (chance, weight) in chances.iter().zip(weights) {
-                prop_assert!((0.0..=1.0).contains(chance) && (*chance > 0.0) == (weight > 0.0));
+            prop_assert!((sum - f64::from(count).min(most)).abs() < 1e-9, "{sum}");
+            for ((chance, weight), cap) in chances.iter().zip(weights).zip(caps) {
+                prop_assert!((0.0..=cap).contains(chance) && (*chance > 0.0) == (weight > 0.0));
             }
         }
 
         /// An even comb of numbers finds every cluster as often as its chance says, and never more
         /// clusters than the count.
         #[test]
-        fn clusters_are_taken_as_often_as_their_chance(weights in weights(), count in 1u32..50) {
+        fn clusters_are_taken_as_often_as_their_chance(
+            (weights, caps) in clusters(), count in 1u32..50
+        ) {
             const DRAWS: u32 = 2048;
             let mut chances = Vec::new();
-            allot(&weights, count, &mut chances);
+            allot(&weights, &caps, count, &mut chances);
             let mut taken = vec![0u32; weights.len()];
             for i in 0..DRAWS {
                 let u = (f64::from(i) + 0.5) / f64::from(DRAWS);

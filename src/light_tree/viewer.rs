@@ -8,7 +8,7 @@ use super::importance::{Cluster, Factors, factors};
 use crate::math::Similarity;
 use glam::Vec3;
 
-/// Something that light is wanted for. What a [`Cluster`] is stays inside this room, and so do the
+/// Something that light is wanted for. What a `Cluster` is stays inside this room, and so do the
 /// implementations.
 pub trait Viewer: Copy {
     /// What the importance of a cluster is made of, and how uncertain it is.

@@ -3,7 +3,8 @@
 //! Along every stretch of a path lights are picked for the whole stretch (seed, "Extending to volume
 //! render"); for each a point of the stretch is drawn by the angle under which the light sees it
 //! (Kulla and Fajardo 2012, "Importance Sampling Techniques for Path Tracing in Participating Media",
-//! section 4), which cancels the pole of `1/d^2`; and from there light is taken as from any point. A
+//! section 4), which cancels the pole of `1/d^2`, and only where the light can shine, which a narrow
+//! beam does on a short part; and from there light is taken as from any point. A
 //! light at infinity sees nothing under an angle: for it, points are drawn by what the fog lets
 //! through. Light that is scattered twice is left out.
 //!
@@ -127,6 +128,15 @@ fn by_transmittance(length: f32, extinction: f32, u: f32) -> Drawn {
 }
 
 impl Integrator<'_> {
+    /// A place where an emitter may shine, by the angle under which it sees it.
+    fn by_angle_of(&self, emitter: u32, segment: &Segment, u: f32) -> Option<Drawn> {
+        let Segment { origin, direction, length } = *segment;
+        let (from, to) = self.emitters.lit_part(emitter, origin, direction, length)?;
+        let lit = Segment { origin: origin + from * direction, direction, length: to - from };
+        let drawn = by_angle(&lit, self.emitters.middle(emitter), u)?;
+        Some(Drawn { t: from + drawn.t, ..drawn })
+    }
+
     /// Light scattered once towards the begin of a stretch of a ray.
     pub(super) fn scattered(
         &self,
@@ -147,9 +157,7 @@ impl Integrator<'_> {
             stats.light_picks += 1;
             let place = another(Vec2::new(u_place, 0.0), salt, pick.light).x;
             let drawn = match pick.light {
-                Picked::Emitter(emitter) => {
-                    by_angle(&segment, self.emitters.middle(emitter), place)
-                }
+                Picked::Emitter(emitter) => self.by_angle_of(emitter, &segment, place),
                 Picked::Beside(_) => Some(by_transmittance(segment.length, extinction, place)),
             };
             let Some(Drawn { t, pdf }) = drawn else { return };

@@ -235,7 +235,8 @@ fn forcing_a_strong_light_behind_a_wall_quiets_the_picture() {
         let set = stage.set();
         let shared = set.tree.trees().iter().filter(|r| TreeKind::of(r) == Some(TreeKind::Shared));
         assert_eq!(shared.count(), usize::from(forced));
-        let buffers = set.render(&RenderSettings { samples: 4096, ..settings(forced.into()) }, 1);
+        let own = settings(forced.into());
+        let buffers = set.render(&RenderSettings { samples: 4096, split: 0.0, ..own }, 1);
         let noise: f64 = buffers.pixels().iter().map(|p| p.variance.as_dvec3().y).sum();
         seen.push((noise, buffers));
     }

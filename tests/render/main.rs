@@ -13,6 +13,7 @@ mod ranges;
 mod real;
 mod references;
 mod rooms;
+mod seams;
 mod shadows;
 #[path = "../ingest/shared.rs"]
 mod shared;

@@ -124,7 +124,7 @@ fn fog(text: &str) -> Result<Medium, String> {
         Err("extinction is not a positive number".into())
     } else if !(0.0..=1.0).contains(&albedo) {
         Err("albedo is not in [0, 1]".into())
-    } else if !(anisotropy.abs() < 1.0) {
+    } else if !(-1.0..1.0).contains(&anisotropy) || anisotropy == -1.0 {
         Err("g is not between -1 and 1".into())
     } else {
         Ok(Medium {

@@ -53,7 +53,9 @@ fn way(text: &str) -> Result<Way, String> {
     let mut parts = how.split(':');
     let read = |text: &str| serde_json::from_value(serde_json::Value::String(text.into()));
     let strategy = read(parts.next().unwrap_or_default()).map_err(|_| wrong())?;
-    let split = parts.next().map_or(Ok(0.0), |text| text.parse::<f32>().map_err(|_| wrong()))?;
+    let split = parts.next().map_or(Ok(RenderSettings::default().split), |text| {
+        text.parse::<f32>().map_err(|_| wrong())
+    })?;
     if !(0.0..=1.0).contains(&split) {
         return Err(format!("{}; SPLIT is from 0 to 1", wrong()));
     }

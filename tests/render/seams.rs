@@ -1,0 +1,52 @@
+//! No seams in the noise: where the decision to split changes, variance does not jump.
+
+use crate::stage::{Stage, at, direct, facing, lambert};
+use crate::strategies::Way;
+use candelabra::render::SplitBy;
+use candelabra::scene::LightKind;
+use glam::{DVec3, Vec3};
+
+/// The variance of one sample of each pixel of a row across a floor, away from a cluster of lights
+/// above its one end.
+fn profile(way: Way) -> Vec<f64> {
+    const PIXELS: u32 = 96;
+    let mut stage = Stage::default();
+    stage.quad([12.0; 2], lambert(Vec3::splat(0.5)), facing(DVec3::ZERO, DVec3::Y));
+    for i in 0..256 {
+        let (x, z) = (f64::from(i % 16) / 16.0 - 3.5, f64::from(i / 16) / 16.0 - 0.5);
+        let bump = 0.1 * f64::from(i * 7 % 5);
+        let intensity_cd = Vec3::splat(0.02);
+        stage.light(LightKind::Point { intensity_cd }, at(DVec3::new(x, 0.6 + bump, z)));
+    }
+    // Far away, so that the row is a straight line of even steps.
+    stage.look(DVec3::new(0.0, 400.0, 1e-3), DVec3::ZERO, 6.0 / 400.0 / PIXELS as f32);
+    let mut settings = way.settings(true, &direct(PIXELS, 8192));
+    settings.height = 1;
+    let buffers = stage.set().render(&settings, 1);
+    let of_one = |pixel: &candelabra::render::buffers::Pixel| {
+        f64::from(pixel.variance.y * 8192.0) / f64::from(pixel.beauty.y).powi(2)
+    };
+    // From beside the cluster on: below it, each light is a hill of its own.
+    buffers.pixels()[24..].iter().map(of_one).collect()
+}
+
+/// The largest factor between neighbours.
+fn largest_jump(profile: &[f64]) -> f64 {
+    let steps: Vec<f64> = profile.windows(2).map(|pair| (pair[1] / pair[0]).ln().abs()).collect();
+    steps.iter().fold(0.0, |most: f64, &step| most.max(step)).exp()
+}
+
+#[test]
+fn variance_changes_smoothly_where_the_seed_has_seams() {
+    let most = u32::MAX;
+    let hard = profile(Way { split_by: SplitBy::SolidAngle, most, ..Way::split(0.8) });
+    let graded = profile(Way { most, ..Way::split(0.1) });
+    let print = |name: &str, profile: &[f64]| {
+        let row: Vec<String> = profile.iter().step_by(3).map(|v| format!("{v:.4}")).collect();
+        println!("{name}: {} (largest step {:.2})", row.join(" "), largest_jump(profile));
+    };
+    print("whole or not at all", &hard);
+    print("graded", &graded);
+    assert!(largest_jump(&hard) > 1.5 * largest_jump(&graded));
+    assert!(largest_jump(&graded) < 1.3);
+}
