@@ -24,9 +24,9 @@ use glam::Vec3;
 const HORIZON_SLACK: f32 = 1e-5;
 /// A cosine this much beyond the cone's edge is not yet called dark. Sines taken from cosines near 1
 /// are off by up to 3.5e-4; the worst that a search along the edge found is 7.4e-4.
-pub(super) const EDGE_SLACK: f32 = 2e-3;
+const EDGE_SLACK: f32 = 2e-3;
 /// The least value of a cosine factor that is not provably zero.
-pub(super) const FLOOR: f32 = 1e-4;
+const FLOOR: f32 = 1e-4;
 /// The share of the sphere's squared radius that softens the squared distance.
 pub(super) const SOFTENING: f32 = 0.1;
 /// Squares of distances and ranges are exact to so many parts.
@@ -68,6 +68,25 @@ impl Cluster {
         let [center, half] =
             [self.center, self.half_extent].map(|v| Vec3::from_array(v).as_dvec3());
         View { radius: half.length(), distance: (center - p.as_dvec3()).length() }
+    }
+
+    /// How much of its light leaves at some cosine off its axis, seen under the half angle `theta_u`:
+    /// 1 inside the cone, falling to its edge, 0 only surely beyond; and the cosine of `theta_o`.
+    #[inline(always)]
+    pub fn emission(&self, along: f32, inside: bool, sin_u: f32, cos_u: f32) -> (f32, f32) {
+        let cosine = along.clamp(-1.0, 1.0);
+        let sine = (1.0 - cosine * cosine).sqrt();
+        let sin_half = self.sin_half_theta_o;
+        let cos_o = 1.0 - 2.0 * sin_half * sin_half;
+        let sin_o = 2.0 * sin_half * (1.0 - sin_half * sin_half).max(0.0).sqrt();
+        // The sine of theta_o + theta_u is negative where the sum is beyond pi.
+        let sin_sum = sin_o * cos_u + cos_o * sin_u;
+        let cos_sum = cos_o * cos_u - sin_o * sin_u;
+        let within = inside | (sin_sum < 0.0) | (cosine >= cos_sum);
+        let off = cosine * cos_sum + sine * sin_sum;
+        let is_dark = !within & (off < self.cos_theta_e - EDGE_SLACK);
+        let emission = if within { 1.0 } else { off.max(FLOOR) };
+        (if is_dark { 0.0 } else { emission }, cos_o)
     }
 
     /// The share of light that is left at a squared distance, m^2; 0 only surely out of range.
@@ -131,22 +150,11 @@ pub(super) fn factors(cluster: &Cluster, receiver: &Receiver) -> Factors {
     let sin_u = if inside { 1.0 } else { r2.sqrt() * inverse_d };
     let cos_u = if inside { 0.0 } else { (d2 - r2).sqrt() * inverse_d };
 
-    // Emission: 1 inside the cone, falling to its edge, 0 beyond. The sine of theta_o + theta_u is
-    // negative where the sum is beyond pi.
     let inverse_axis = 1.0 / (ax * ax + ay * ay + az * az).sqrt();
     let along = (ax * vx + ay * vy + az * vz) * inverse_d * inverse_axis;
     let along = if cluster.two_sided { along.abs() } else { along };
-    let cosine = along.clamp(-1.0, 1.0);
-    let sine = (1.0 - cosine * cosine).sqrt();
-    let sin_half = cluster.sin_half_theta_o;
-    let cos_o = 1.0 - 2.0 * sin_half * sin_half;
-    let sin_o = 2.0 * sin_half * (1.0 - sin_half * sin_half).max(0.0).sqrt();
-    let sin_sum = sin_o * cos_u + cos_o * sin_u;
-    let cos_sum = cos_o * cos_u - sin_o * sin_u;
-    let within = inside | (sin_sum < 0.0) | (cosine >= cos_sum);
-    let off = cosine * cos_sum + sine * sin_sum;
-    let is_dark = !within & (off < cluster.cos_theta_e - EDGE_SLACK);
-    let emission = if within { 1.0 } else { off.max(FLOOR) };
+    let (emission, cos_o) = cluster.emission(along, inside, sin_u, cos_u);
+    let is_dark = emission == 0.0;
 
     // Reception: the largest cosine that any point of the sphere can have. Without a normal every
     // direction counts alike.

@@ -6,7 +6,7 @@
 //! the integral of `1/r^2` over the stretch, `(theta_b - theta_a) / d` (HPG 2018, equation 4), which
 //! also knows how long the stretch is.
 
-use super::importance::{Cluster, EDGE_SLACK, FLOOR, Factors, SOFTENING, View, spread};
+use super::importance::{Cluster, Factors, SOFTENING, View, spread};
 use super::viewer::Viewer;
 use crate::math::Similarity;
 use glam::Vec3;
@@ -89,17 +89,8 @@ impl Viewer for Segment {
         };
         let axis = axis.normalize_or(Vec3::Z);
         let cosine = self.largest_cosine(standing.to_origin, axis, cluster.two_sided);
-        let cosine = cosine.clamp(-1.0, 1.0);
-        let sine = (1.0 - cosine * cosine).sqrt();
-        let sin_half = cluster.sin_half_theta_o;
-        let cos_o = 1.0 - 2.0 * sin_half * sin_half;
-        let sin_o = 2.0 * sin_half * (1.0 - sin_half * sin_half).max(0.0).sqrt();
-        let sin_sum = sin_o * cos_u + cos_o * sin_u;
-        let cos_sum = cos_o * cos_u - sin_o * sin_u;
-        let within = inside | (sin_sum < 0.0) | (cosine >= cos_sum);
-        let off = cosine * cos_sum + sine * sin_sum;
-        let is_dark = !within & (off < cluster.cos_theta_e - EDGE_SLACK);
-        let emission = if within { 1.0 } else { off.max(FLOOR) };
+        let (emission, cos_o) = cluster.emission(cosine, inside, sin_u, cos_u);
+        let is_dark = emission == 0.0;
 
         // The integral of 1 / (line^2 + t^2), softened like the square of a distance elsewhere.
         let line = (standing.line2 + SOFTENING * r2).sqrt();
