@@ -95,6 +95,14 @@ impl InfiniteLight<'_> {
         }
     }
 
+    /// A sun's middle, unit, world space, and its half angle, radians.
+    pub fn disk(&self) -> Option<(Vec3, f32)> {
+        match &self.kind {
+            Kind::Sun(sun) => Some((sun.towards, sun.half_angle_rad)),
+            Kind::Dome(_) => None,
+        }
+    }
+
     /// A direction towards the light, for a surface with this normal (zero: in any direction).
     pub fn sample(&self, normal: Vec3, u: Vec2) -> Option<InfiniteSample> {
         match &self.kind {

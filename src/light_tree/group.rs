@@ -5,12 +5,11 @@
 //! intermediate cluster blurs it; and a smaller file, because the intermediate clusters are gone.
 //! Fields are kept apart, lane by lane, as vector instructions want them.
 
-use super::importance::{Cluster, importance};
+use super::importance::{Cluster, Sight, importance};
 use super::node::{self, Link, Node};
 use super::viewer::Viewer;
 use super::wide;
 use bytemuck::{Pod, Zeroable};
-use std::array::from_fn;
 
 /// Children of a cluster.
 pub const WIDTH: usize = 8;
@@ -32,13 +31,15 @@ pub struct Group {
 }
 
 /// All lanes, decoded field by field: each loop is one kind of conversion.
+#[derive(Default)]
 pub(super) struct Lanes {
     center: [[f32; WIDTH]; 3],
     half_extent: [[f32; WIDTH]; 3],
     axis: [[f32; WIDTH]; 3],
     sin_half_theta_o: [f32; WIDTH],
     cos_theta_e: [f32; WIDTH],
-    two_sided: [bool; WIDTH],
+    /// Not zero if it is.
+    two_sided: [u32; WIDTH],
     inverse_range2: [f32; WIDTH],
 }
 
@@ -112,24 +113,33 @@ impl Group {
 
     #[inline(always)]
     pub(super) fn decode(&self) -> Lanes {
-        let scale = self.half_exponent.map(node::scale);
-        let half_extent =
-            self.half_extent.map(|codes| from_fn(|lane| f32::from(codes[lane]) * scale[lane]));
-        let axis: [[f32; 3]; WIDTH] =
-            from_fn(|lane| node::decode_axis([self.axis[0][lane], self.axis[1][lane]]));
-        Lanes {
-            center: self.center,
-            half_extent,
-            axis: from_fn(|part| axis.map(|direction| direction[part])),
-            sin_half_theta_o: self.theta_o.map(node::decode_sin_half_theta_o),
-            cos_theta_e: self.theta_e.map(node::decode_cos_theta_e),
-            two_sided: self.theta_o.map(node::is_two_sided),
-            inverse_range2: if self.range == [0; WIDTH] {
-                [0.0; WIDTH]
-            } else {
-                self.range.map(node::decode_inverse_range2)
-            },
+        // Plain loops, each over one kind of conversion: what the compiler turns into vectors.
+        let mut lanes = Lanes { center: self.center, ..Lanes::default() };
+        for lane in 0..WIDTH {
+            let scale = node::scale(self.half_exponent[lane]);
+            lanes.half_extent[0][lane] = f32::from(self.half_extent[0][lane]) * scale;
+            lanes.half_extent[1][lane] = f32::from(self.half_extent[1][lane]) * scale;
+            lanes.half_extent[2][lane] = f32::from(self.half_extent[2][lane]) * scale;
         }
+        for lane in 0..WIDTH {
+            let axis = node::decode_axis([self.axis[0][lane], self.axis[1][lane]]);
+            lanes.axis[0][lane] = axis[0];
+            lanes.axis[1][lane] = axis[1];
+            lanes.axis[2][lane] = axis[2];
+        }
+        for lane in 0..WIDTH {
+            lanes.sin_half_theta_o[lane] = node::decode_sin_half_theta_o(self.theta_o[lane]);
+            lanes.two_sided[lane] = node::is_two_sided(self.theta_o[lane]).into();
+        }
+        for lane in 0..WIDTH {
+            lanes.cos_theta_e[lane] = node::decode_cos_theta_e(self.theta_e[lane]);
+        }
+        if self.range != [0; WIDTH] {
+            for lane in 0..WIDTH {
+                lanes.inverse_range2[lane] = node::decode_inverse_range2(self.range[lane]);
+            }
+        }
+        lanes
     }
 }
 
@@ -151,11 +161,18 @@ impl Group {
         // Lane by lane, each quantity in an array of its own: so the compiler computes all lanes
         // together.
         let (mut products, mut decays, mut spreads) = ([0.0; WIDTH], [0.0; WIDTH], [0.0; WIDTH]);
+        let mut sights = Sights::default();
         let lanes = self.decode();
         for lane in 0..WIDTH {
             let factors = viewer.factors(&lanes.cluster(lane));
             (products[lane], decays[lane]) = (factors.product, factors.decay);
             spreads[lane] = factors.spread;
+            sights.set(lane, &factors.sight);
+        }
+        for lane in 0..WIDTH {
+            let (reflected, unsure) = viewer.reflect(&sights.get(lane));
+            products[lane] *= reflected;
+            spreads[lane] += unsure;
         }
         let mut weights = [0.0; WIDTH];
         for lane in 0..WIDTH {
@@ -175,8 +192,38 @@ impl Lanes {
             axis: of(&self.axis),
             sin_half_theta_o: self.sin_half_theta_o[lane],
             cos_theta_e: self.cos_theta_e[lane],
-            two_sided: self.two_sided[lane],
+            two_sided: self.two_sided[lane] != 0,
             inverse_range2: self.inverse_range2[lane],
+        }
+    }
+}
+
+/// Eight sights, lane by lane.
+#[derive(Default)]
+struct Sights {
+    to: [[f32; WIDTH]; 3],
+    cosine: [f32; WIDTH],
+    cos_u: [f32; WIDTH],
+    sin_u: [f32; WIDTH],
+}
+
+impl Sights {
+    #[inline(always)]
+    fn set(&mut self, lane: usize, sight: &Sight) {
+        for (part, to) in self.to.iter_mut().zip(sight.to) {
+            part[lane] = to;
+        }
+        self.cosine[lane] = sight.cosine;
+        (self.cos_u[lane], self.sin_u[lane]) = (sight.cos_u, sight.sin_u);
+    }
+
+    #[inline(always)]
+    fn get(&self, lane: usize) -> Sight {
+        Sight {
+            to: [self.to[0][lane], self.to[1][lane], self.to[2][lane]],
+            cosine: self.cosine[lane],
+            cos_u: self.cos_u[lane],
+            sin_u: self.sin_u[lane],
         }
     }
 }

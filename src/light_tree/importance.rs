@@ -107,6 +107,8 @@ pub struct Factors {
     pub decay: f32,
     /// How uncertain it is: the squared relative deviation of what the cluster's emitters send.
     pub spread: f32,
+    /// Where it comes from.
+    pub sight: Sight,
 }
 
 /// Squared distances to the sphere's surface are not taken below this share of its squared radius:
@@ -124,7 +126,28 @@ pub(super) fn spread(r2: f32, d2: f32, cos_o: f32, cos_e: f32) -> f32 {
     of_distance + of_direction
 }
 
-/// Importance is energy times the product over the decay.
+/// The sphere of a cluster as a surface sees it: a cone of directions.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Sight {
+    /// Unit, towards the centre.
+    pub to: [f32; 3],
+    /// The largest cosine that any direction of the cone has with the normal; above zero.
+    pub cosine: f32,
+    /// Of the cone's half angle; a right angle inside the sphere.
+    pub cos_u: f32,
+    pub sin_u: f32,
+}
+
+impl Sight {
+    /// `1 - cos theta_u` without its cancellation.
+    #[inline(always)]
+    pub fn one_minus_cos_u(&self) -> f32 {
+        self.sin_u * self.sin_u / (1.0 + self.cos_u)
+    }
+}
+
+/// Importance is energy times the product over the decay. Here without what becomes of the light at the
+/// receiver, for which the sight is there.
 #[inline(always)]
 pub(super) fn factors(cluster: &Cluster, receiver: &Receiver) -> Factors {
     let [px, py, pz] = receiver.point.to_array();
@@ -162,18 +185,20 @@ pub(super) fn factors(cluster: &Cluster, receiver: &Receiver) -> Factors {
     let cosine_i = (-below * inverse_d).clamp(-1.0, 1.0);
     let sine_i = (1.0 - cosine_i * cosine_i).sqrt();
     let best = if cosine_i >= cos_u { 1.0 } else { cosine_i * cos_u + sine_i * sin_u };
-    let reception = if inside | in_medium { 1.0 } else { best.max(FLOOR) };
+    let cosine = if inside | in_medium { 1.0 } else { best.max(FLOOR) };
+    let to = [-vx * inverse_d, -vy * inverse_d, -vz * inverse_d];
 
     // Range: at the point of the box that is nearest.
     let [ox, oy, oz] =
         [(vx.abs() - hx).max(0.0), (vy.abs() - hy).max(0.0), (vz.abs() - hz).max(0.0)];
     let window = cluster.window(ox * ox + oy * oy + oz * oz);
 
-    let product = emission * reception * window;
+    let product = emission * window;
     Factors {
         product: if is_below | is_dark { 0.0 } else { product },
         decay: distance2,
         spread: spread(r2, d2, cos_o, cluster.cos_theta_e),
+        sight: Sight { to, cosine, cos_u, sin_u },
     }
 }
 

@@ -11,8 +11,8 @@
 //! |---|---|
 //! | `node` | 32 bytes: bounds rounded outwards, and a link |
 //! | `group` | the eight children of a cluster, lane by lane |
-//! | `viewer` | who asks: a [`Receiver`], or a stretch of a ray ([`Segment`]) |
-//! | `importance`, `segment` | what a cluster may send to each |
+//! | `viewer` | who asks: a [`Receiver`], a [`Glossy`] one, or a stretch of a ray ([`Segment`]) |
+//! | `importance`, `glossy`, `segment` | what a cluster may send to each |
 //! | `wide` | the same code for wider vector registers |
 //! | `builder` | the partition (SAOH) and the bounds, deterministic and parallel |
 //! | `writer`, `records`, `tree` | the trees of a shot as a file, and that file opened |
@@ -25,6 +25,7 @@
 
 mod builder;
 mod cut;
+mod glossy;
 mod group;
 mod importance;
 mod leaves;
@@ -44,6 +45,7 @@ mod writer;
 
 pub use builder::ALGORITHM_VERSION;
 pub use cut::{Picked, Scratch};
+pub use glossy::{Glossy, Lobes};
 pub use group::{Group, WIDTH};
 pub use leaves::LeafTable;
 pub use node::{Link, Node};
@@ -53,5 +55,5 @@ pub use segment::Segment;
 pub use splitting::{SplitTest, Splitting};
 pub use tree::{LightTree, NoSuchFrame};
 pub use variance::Moments;
-pub use viewer::{DistanceOnly, Glossy, Receiver, Viewer};
+pub use viewer::{DistanceOnly, Receiver, Viewer};
 pub use writer::{LightSummary, LightTreeWriter};

@@ -179,7 +179,8 @@ impl Node {
     /// units; 0 only where none of its light can arrive.
     pub fn importance(&self, viewer: &impl Viewer) -> f64 {
         let factors = viewer.factors(&self.cluster());
-        importance(self.energy(), factors.product, factors.decay)
+        let (reflected, _) = viewer.reflect(&factors.sight);
+        importance(self.energy(), factors.product * reflected, factors.decay)
     }
 }
 

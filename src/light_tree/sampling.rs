@@ -231,35 +231,48 @@ impl FrameTree<'_> {
 /// The importances of a group's lanes, of which one at least is not zero.
 pub(super) struct Weights {
     pub of_lane: [f64; WIDTH],
-    total: f64,
+    /// Where each lane's stretch ends, all laid out along a line.
+    ends: [f64; WIDTH],
 }
 
 impl Weights {
     #[inline]
     pub fn of(group: &Group, viewer: &impl Viewer) -> Option<Weights> {
         let of_lane = group.importances(viewer);
-        let total: f64 = of_lane.iter().sum();
-        (total > 0.0 && total.is_finite()).then_some(Weights { of_lane, total })
+        let ends = running_sums(&of_lane);
+        let total = ends[WIDTH - 1];
+        (total > 0.0 && total.is_finite()).then_some(Weights { of_lane, ends })
     }
 
     /// The probability of a lane.
     #[inline]
     pub fn share(&self, lane: usize) -> f64 {
-        self.of_lane[lane] / self.total
+        self.of_lane[lane] / self.ends[WIDTH - 1]
     }
 
     /// Chooses a lane by its share, and returns what is left of the random number.
     #[inline]
     pub fn choose(&self, u: f64) -> (usize, f64) {
-        let target = u * self.total;
-        let (mut lane, mut before, mut running) = (0, 0.0, 0.0);
-        for (i, weight) in self.of_lane.iter().enumerate() {
-            // The last lane with a weight whose stretch begins at or before the target.
-            let begins = *weight > 0.0 && running <= target;
-            lane = if begins { i } else { lane };
-            before = if begins { running } else { before };
-            running += weight;
-        }
-        (lane, ((target - before) / self.of_lane[lane]).clamp(0.0, BELOW_ONE))
+        let target = u * self.ends[WIDTH - 1];
+        // The first that ends beyond the target has a weight; rounding may leave none.
+        let before: usize = self.ends.iter().map(|&end| usize::from(end <= target)).sum();
+        let lane = if before < WIDTH { before } else { self.last() };
+        let begin = self.ends[lane] - self.of_lane[lane];
+        (lane, ((target - begin) / self.of_lane[lane]).clamp(0.0, BELOW_ONE))
     }
+
+    #[cold]
+    fn last(&self) -> usize {
+        self.of_lane.iter().rposition(|&weight| weight > 0.0).unwrap_or(0)
+    }
+}
+
+/// The sums of the first one, two, ... eight numbers, none negative: by halves, which wait for three
+/// additions and not for eight. They never fall, and stay where a number is zero.
+#[inline(always)]
+fn running_sums(of: &[f64; WIDTH]) -> [f64; WIDTH] {
+    let [a, b, c, d, e, f, g, h] = *of;
+    let (ab, cd, ef, gh) = (a + b, c + d, e + f, g + h);
+    let abcd = ab + cd;
+    [a, ab, ab + c, abcd, abcd + e, abcd + ef, abcd + (ef + g), abcd + (ef + gh)]
 }

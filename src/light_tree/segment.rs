@@ -6,7 +6,7 @@
 //! the integral of `1/r^2` over the stretch, `(theta_b - theta_a) / d` (HPG 2018, equation 4), which
 //! also knows how long the stretch is.
 
-use super::importance::{Cluster, Factors, SOFTENING, View, spread};
+use super::importance::{Cluster, Factors, SOFTENING, Sight, View, spread};
 use super::viewer::Viewer;
 use crate::math::Similarity;
 use glam::Vec3;
@@ -106,6 +106,7 @@ impl Viewer for Segment {
             product: if is_dark { 0.0 } else { product },
             decay: line,
             spread: spread(r2, standing.nearest2, cos_o, cluster.cos_theta_e),
+            sight: Sight::default(),
         }
     }
 

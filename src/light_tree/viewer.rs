@@ -4,7 +4,7 @@
 //! description is shared by sampling and by its probability, so that they cannot disagree about
 //! where they stand. Viewers are copied into the space of a shared subtree when a walk enters it.
 
-use super::importance::{Cluster, Factors, factors};
+use super::importance::{Cluster, Factors, Sight, factors};
 use crate::math::Similarity;
 use glam::Vec3;
 
@@ -13,6 +13,13 @@ use glam::Vec3;
 pub trait Viewer: Copy {
     /// What the importance of a cluster is made of, and how uncertain it is.
     fn factors(&self, cluster: &Cluster) -> Factors;
+
+    /// What becomes of light that comes from somewhere, if [`factors`](Viewer::factors) does not know:
+    /// another factor of the importance, and how uncertain that one is.
+    #[inline(always)]
+    fn reflect(&self, _sight: &Sight) -> (f32, f32) {
+        (1.0, 0.0)
+    }
 
     /// The seed's test of splitting: the solid angle of a cluster times the peak of the BSDF towards
     /// it.
@@ -43,23 +50,11 @@ pub struct Receiver {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DistanceOnly<V>(pub V);
 
-/// A receiver that says where its surface reflects to, for the seed's test of splitting.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Glossy {
-    /// Where it is.
-    pub receiver: Receiver,
-    /// A direction drawn from the BSDF, unit, world space: step 1 of the seed's "Split heuristic".
-    pub toward: Vec3,
-    /// GGX alpha of the surface.
-    pub alpha: f32,
-    /// Which part of what is reflected the specular lobe reflects, `[0, 1]`.
-    pub specular: f32,
-}
-
 impl Viewer for Receiver {
     #[inline(always)]
     fn factors(&self, cluster: &Cluster) -> Factors {
-        factors(cluster, self)
+        let factors = factors(cluster, self);
+        Factors { product: factors.product * factors.sight.cosine, ..factors }
     }
 
     fn glare(&self, cluster: &Cluster) -> f64 {
@@ -77,6 +72,11 @@ impl<V: Viewer> Viewer for DistanceOnly<V> {
         self.0.factors(&Cluster { sin_half_theta_o: 1.0, ..*cluster })
     }
 
+    #[inline(always)]
+    fn reflect(&self, sight: &Sight) -> (f32, f32) {
+        self.0.reflect(sight)
+    }
+
     fn glare(&self, cluster: &Cluster) -> f64 {
         self.0.glare(cluster)
     }
@@ -87,41 +87,5 @@ impl<V: Viewer> Viewer for DistanceOnly<V> {
 
     fn within(&self, space: &Similarity) -> DistanceOnly<V> {
         DistanceOnly(self.0.within(space))
-    }
-}
-
-impl Viewer for Glossy {
-    #[inline(always)]
-    fn factors(&self, cluster: &Cluster) -> Factors {
-        factors(cluster, &self.receiver)
-    }
-
-    fn glare(&self, cluster: &Cluster) -> f64 {
-        let view = cluster.view_from(self.receiver.point);
-        view.solid_angle() * self.peak(cluster, view.radius, view.distance)
-    }
-
-    fn within(&self, space: &Similarity) -> Glossy {
-        let receiver = self.receiver.within(space);
-        Glossy { receiver, toward: space.direction(self.toward), ..*self }
-    }
-}
-
-impl Glossy {
-    /// Steps 2 and 3 of the seed's "Split heuristic": the largest cosine that any direction to the
-    /// cluster has with the drawn one, and a GGX lobe of the surface's roughness there, 1/sr. The
-    /// lobe is taken about the drawn direction: its half vector stands at half the angle, and the
-    /// change to directions of light divides by four.
-    fn peak(&self, cluster: &Cluster, radius: f64, distance: f64) -> f64 {
-        let diffuse = (1.0 - f64::from(self.specular)) * std::f64::consts::FRAC_1_PI;
-        let to_center = Vec3::from_array(cluster.center) - self.receiver.point;
-        let off = to_center.as_dvec3().angle_between(self.toward.as_dvec3());
-        let theta_u =
-            if distance > radius { (radius / distance).asin() } else { std::f64::consts::PI };
-        let cosine = (0.5 * (off - theta_u).max(0.0)).cos();
-        let alpha2 = f64::from(self.alpha).powi(2);
-        let shape = cosine * cosine * (alpha2 - 1.0) + 1.0;
-        let ggx = alpha2 / (std::f64::consts::PI * shape * shape);
-        diffuse + f64::from(self.specular) * 0.25 * ggx
     }
 }

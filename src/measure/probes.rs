@@ -70,7 +70,6 @@ pub struct StrategyReport {
 /// A point, and what all lights give it.
 struct Probe {
     wanted: Wanted,
-    glossy: Wanted,
     contributions: Contributions,
     sum: f64,
 }
@@ -132,9 +131,8 @@ fn probe(integrator: &Integrator, number: u32, options: &ProbeOptions) -> Option
     let vertex = integrator.probe(x, y, seed, number % 2)?;
     let contributions = Contributions::at(integrator, &vertex, options.visibility);
     let sum = contributions.sum();
-    let glossy = integrator.glossy(&vertex, &mut Sampler::new(seed, 1));
-    let wanted = Wanted::At(vertex.receiver);
-    (sum > 0.0).then_some(Probe { wanted, glossy, contributions, sum })
+    let wanted = vertex.wanted(Some(&mut Sampler::new(seed, 1)));
+    (sum > 0.0).then_some(Probe { wanted, contributions, sum })
 }
 
 fn of_strategy(
@@ -177,7 +175,7 @@ fn of_strategy(
 
 /// Variance of the estimate, and how many lights it takes.
 fn of_probe(picker: &LightPicker, strategy: LightStrategy, probe: &Probe) -> (f64, f64) {
-    let wanted = if picker.asks_for_lobe() { &probe.glossy } else { &probe.wanted };
+    let wanted = &probe.wanted;
     match strategy {
         LightStrategy::All => (0.0, f64::from(picker.count())),
         LightStrategy::Tree | LightStrategy::Distance => {
@@ -210,9 +208,8 @@ fn nanoseconds(picker: &LightPicker, probes: &[Probe]) -> f64 {
             let started = Instant::now();
             let mut picked = 0u32;
             for (number, probe) in (0..).zip(probes) {
-                let wanted = if picker.asks_for_lobe() { &probe.glossy } else { &probe.wanted };
                 let u = (hash(round, number) >> 8) as f32 / 16_777_216.0;
-                picker.pick(wanted, u, number, &mut scratch, |_| picked += 1);
+                picker.pick(&probe.wanted, u, number, &mut scratch, |_| picked += 1);
             }
             std::hint::black_box(picked);
             started.elapsed().as_nanos() as f64 / probes.len().max(1) as f64

@@ -15,8 +15,8 @@ use super::rays::{Anchor, Hit, HitSurface, Tracer};
 use super::settings::RenderSettings;
 use super::surface::Surfaces;
 use crate::emitter::{EmitterHit, InfiniteLight, PosedEmitters};
-use crate::light_tree::{Glossy, Picked, Receiver};
-use crate::math::color::{Rgb, luminance};
+use crate::light_tree::{Glossy, Lobes, Picked, Receiver};
+use crate::math::color::Rgb;
 use crate::math::random::{Sampler, hash};
 use glam::{Vec2, Vec3};
 
@@ -227,23 +227,10 @@ impl Integrator<'_> {
 
     /// What lights are picked for at a vertex.
     fn wanted(&self, vertex: &Vertex, sampler: &mut Sampler) -> Wanted {
-        match self.picker.asks_for_lobe() {
-            true => self.glossy(vertex, sampler),
+        match self.picker.looks() {
+            true => vertex.wanted(self.picker.asks_for_direction().then_some(sampler)),
             false => Wanted::At(vertex.receiver),
         }
-    }
-
-    /// The same with a direction that the surface reflects to.
-    pub fn glossy(&self, vertex: &Vertex, sampler: &mut Sampler) -> Wanted {
-        let receiver = vertex.receiver;
-        // A direction of its own: the one that the path goes on in may hit a light, and then its
-        // weight must not depend on it.
-        let [lobe, u, v, _] = sampler.next_4d();
-        let toward = vertex.bsdf.sample(vertex.wo, lobe, Vec2::new(u, v));
-        let toward = toward.map_or(receiver.normal, |sample| sample.wi);
-        let (specular, diffuse) = vertex.bsdf.albedo(vertex.wo);
-        let specular = luminance(specular) / luminance(specular + diffuse).max(f32::MIN_POSITIVE);
-        Wanted::Glossy(Glossy { receiver, toward, alpha: vertex.bsdf.alpha(), specular })
     }
 
     /// Light that a ray finds where it ends, weighed against having picked it.
@@ -323,6 +310,24 @@ impl Integrator<'_> {
 }
 
 impl Vertex {
+    /// What lights are wanted for here: how it reflects matters if that is more than a cosine. Given a
+    /// sampler, draws a direction that it reflects to.
+    pub fn wanted(&self, sampler: Option<&mut Sampler>) -> Wanted {
+        let receiver = self.receiver;
+        let is_glossy = |lobes: &Lobes| lobes.at_normal + lobes.toward_grazing > 0.0;
+        let Some(lobes) = self.bsdf.toward(self.wo).filter(is_glossy) else {
+            return Wanted::At(receiver);
+        };
+        // A direction of its own: that which the path goes on in may hit a light, and then its weight
+        // must not depend on it.
+        let drawn = sampler.and_then(|sampler| {
+            let [lobe, u, v, _] = sampler.next_4d();
+            self.bsdf.sample(self.wo, lobe, Vec2::new(u, v))
+        });
+        let toward = drawn.map_or(receiver.normal, |sample| sample.wi);
+        Wanted::Glossy(Glossy { receiver, to_eye: self.wo, lobes, toward })
+    }
+
     /// Whether the surface itself, not only its shading normal, lets light pass between `wo` and a
     /// direction without going through it.
     pub fn lets_through(&self, wi: Vec3) -> bool {

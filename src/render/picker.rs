@@ -29,7 +29,7 @@ pub struct LightPick {
 pub enum Wanted {
     /// A point of a surface.
     At(Receiver),
-    /// The same, and where it reflects to.
+    /// The same, and how it reflects.
     Glossy(Glossy),
     /// A stretch of a ray in a medium, with the length over which it transmits light.
     Along(Segment, f32),
@@ -118,8 +118,13 @@ impl<'a> LightPicker<'a> {
             || self.infinite.iter().any(|light| light.forced)
     }
 
-    /// Whether the test of splitting asks where a surface reflects to.
-    pub fn asks_for_lobe(&self) -> bool {
+    /// Whether picking looks at what lights may send.
+    pub fn looks(&self) -> bool {
+        matches!(self.strategy, LightStrategy::Tree | LightStrategy::Exhaustive)
+    }
+
+    /// Whether the test of splitting asks for a direction that the surface reflects to.
+    pub fn asks_for_direction(&self) -> bool {
         !self.splitting.is_off() && self.splitting.test == SplitTest::SolidAngle
     }
 
@@ -331,9 +336,15 @@ impl<'a> LightPicker<'a> {
 /// An estimate of the irradiance, lux; along a segment integrated over the length that transmits.
 fn importance_of(light: &InfiniteLight, wanted: &Wanted) -> f64 {
     match wanted {
-        Wanted::At(receiver) | Wanted::Glossy(Glossy { receiver, .. }) => {
-            light.importance(receiver.normal)
-        }
+        Wanted::At(receiver) => light.importance(receiver.normal),
+        Wanted::Glossy(glossy) => match light.disk() {
+            _ if light.importance(glossy.receiver.normal) == 0.0 => 0.0,
+            Some((towards, half_angle_rad)) => {
+                let reflects = glossy.reflects_from(towards, half_angle_rad);
+                light.importance(Vec3::ZERO) * f64::from(reflects)
+            }
+            None => light.importance(glossy.receiver.normal) * f64::from(glossy.albedo()),
+        },
         Wanted::Along(_, length) => light.importance(Vec3::ZERO) * f64::from(*length),
     }
 }

@@ -3,7 +3,9 @@
 //! `cargo bench --bench light_tree`
 
 use candelabra::bounds::{Aabb, Cone, LightBounds};
-use candelabra::light_tree::{LightSummary, LightTree, LightTreeWriter, Link, Receiver, TreeKind};
+use candelabra::light_tree::{
+    Glossy, LightSummary, LightTree, LightTreeWriter, Link, Lobes, Receiver, TreeKind,
+};
 use candelabra::math::random::{hash, widen};
 use candelabra::pipeline::open_tree;
 use candelabra::store::AlignedBytes;
@@ -88,6 +90,27 @@ fn benchmarks(criterion: &mut Criterion) {
         b.iter(|| {
             next += 1;
             frame.sample(&receiver(next), widen(random(next, 4), next))
+        });
+    });
+    let glossy = |i: u32| Glossy {
+        receiver: receiver(i),
+        to_eye: Vec3::new(0.6, 0.8, 0.0),
+        lobes: Lobes { diffuse: 0.5, at_normal: 0.04, toward_grazing: 0.5, alpha: 0.1 },
+        toward: Vec3::Y,
+    };
+    group.bench_function("one pick for a glossy surface, one thread", |b| {
+        b.iter(|| {
+            next += 1;
+            frame.sample(&glossy(next), widen(random(next, 4), next))
+        });
+    });
+    let mapped = open_tree(&path, true).unwrap();
+    let mapped_leaves = mapped.leaf_table();
+    let mapped_frame = mapped.at_frame(0, &mapped_leaves).unwrap();
+    group.bench_function("one pick from a mapped file, one thread", |b| {
+        b.iter(|| {
+            next += 1;
+            mapped_frame.sample(&receiver(next), widen(random(next, 4), next))
         });
     });
     group.bench_function("one probability, one thread", |b| {

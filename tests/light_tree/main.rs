@@ -3,6 +3,7 @@
 mod build;
 mod city;
 mod extremes;
+mod glossy;
 mod importance;
 mod instances;
 mod invariance;

@@ -2,7 +2,7 @@
 
 use candelabra::bounds::{Aabb, Cone, LightBounds};
 use candelabra::light_tree::{
-    DistanceOnly, FrameTree, Glossy, LightSummary, LightTree, LightTreeWriter, Link, Node,
+    DistanceOnly, FrameTree, Glossy, LightSummary, LightTree, LightTreeWriter, Link, Lobes, Node,
     Receiver, Segment, Splitting, TreeKind, Viewer,
 };
 use candelabra::store::AlignedBytes;
@@ -163,17 +163,32 @@ pub fn any_viewer() -> impl Strategy<Value = AnyViewer> {
     let segment = (position(), direction(), length).prop_map(|(origin, direction, length)| {
         AnyViewer::Segment(Segment { origin, direction, length })
     });
-    let glossy = (receiver(), direction(), 0.01f32..1.0, 0f32..1.0).prop_map(
-        |(receiver, toward, alpha, specular)| {
-            AnyViewer::Glossy(Glossy { receiver, toward, alpha, specular })
-        },
-    );
+    let glossy = glossy().prop_map(AnyViewer::Glossy);
     prop_oneof![
         3 => receiver().prop_map(AnyViewer::Receiver),
         1 => segment,
         1 => glossy,
         1 => receiver().prop_map(|receiver| AnyViewer::DistanceOnly(DistanceOnly(receiver))),
     ]
+}
+
+/// A receiver that reflects: anything from paper to a mirror, seen from anywhere.
+pub fn glossy() -> impl Strategy<Value = Glossy> {
+    let alpha = prop_oneof![1 => Just(1e-3f32), 3 => 0.01f32..1.0];
+    let lobes = (0f32..0.8, 0f32..1.0, 0f32..1.0, alpha).prop_map(
+        |(diffuse, at_normal, toward_grazing, alpha)| Lobes {
+            diffuse,
+            at_normal,
+            toward_grazing,
+            alpha,
+        },
+    );
+    (receiver(), direction(), direction(), direction(), lobes).prop_map(
+        |(receiver, normal, to_eye, toward, lobes)| {
+            let to_eye = to_eye * 1f32.copysign(to_eye.dot(normal));
+            Glossy { receiver: Receiver { normal, ..receiver }, to_eye, lobes, toward }
+        },
+    )
 }
 
 /// The knob at its ends and between, with a cap or without, by either test.

@@ -23,7 +23,8 @@ pub mod ggx;
 #[cfg(test)]
 mod tests;
 
-use crate::math::color::Rgb;
+use crate::light_tree;
+use crate::math::color::{Rgb, luminance};
 use crate::math::{Frame, warp};
 use albedo::Albedo;
 use glam::{Vec2, Vec3};
@@ -134,10 +135,16 @@ impl Bsdf {
         }
     }
 
-    /// GGX alpha of the specular lobe, at least [`ALPHA_MIN`].
-    #[inline]
-    pub fn alpha(&self) -> f32 {
-        self.alpha
+    /// What it reflects towards `wo`, as picking lights asks for it; `None` below the horizon or if it
+    /// is black.
+    pub fn toward(&self, wo: Vec3) -> Option<light_tree::Lobes> {
+        let lobes = self.lobes(wo)?;
+        Some(light_tree::Lobes {
+            diffuse: luminance(lobes.diffuse) / FRAC_1_PI,
+            at_normal: luminance(lobes.at_normal),
+            toward_grazing: luminance(lobes.toward_grazing),
+            alpha: self.alpha,
+        })
     }
 
     /// Reflectance of the specular and of the diffuse lobe toward `wo`; their sum is the share of
