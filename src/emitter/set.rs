@@ -93,6 +93,8 @@ pub struct Emitters {
     lights: Vec<LightEntry>,
     mesh_lights: Vec<MeshLight>,
     count: u32,
+    /// The first emitter of each light, close together.
+    firsts: Vec<u32>,
     /// For every [`BLOCK`] emitters the light of the first.
     blocks: Vec<u32>,
     /// For each instance of the scene its light, if it is one.
@@ -144,7 +146,8 @@ impl Emitters {
                 LightSource::Light(light) => entry_of_light[light as usize] = Some(row),
             }
         }
-        Emitters { lights, mesh_lights, count, blocks, light_of_instance, entry_of_light }
+        let firsts = lights.iter().map(|light| light.first).collect();
+        Emitters { lights, mesh_lights, count, firsts, blocks, light_of_instance, entry_of_light }
     }
 
     /// The lights, in the order of their emitters.
@@ -177,12 +180,16 @@ impl Emitters {
     #[inline]
     pub fn get(&self, emitter: u32) -> EmitterRef {
         let block = (emitter / BLOCK) as usize;
-        let (from, to) = (self.blocks[block], self.blocks.get(block + 1));
-        let to = to.map_or(self.lights.len(), |&to| to as usize + 1);
-        let candidates = &self.lights[from as usize..to];
-        let after = candidates.partition_point(|light| light.first <= emitter);
-        let light = from + after as u32 - 1;
-        EmitterRef { light, own: emitter - self.lights[light as usize].first }
+        let from = self.blocks[block] as usize;
+        let to = self.blocks.get(block + 1).map_or(self.firsts.len(), |&to| to as usize + 1);
+        let firsts = &self.firsts[from..to];
+        // Where each light has one emitter, as points have, it is at once known which.
+        let guess = (emitter - firsts[0]) as usize;
+        let light = match firsts.get(guess) {
+            Some(&first) if first == emitter => from + guess,
+            _ => from + firsts.partition_point(|&first| first <= emitter) - 1,
+        };
+        EmitterRef { light: light as u32, own: emitter - self.firsts[light] }
     }
 
     /// Where an emitter is in the scene.
