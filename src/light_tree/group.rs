@@ -31,7 +31,6 @@ pub struct Group {
 }
 
 /// All lanes, decoded field by field: each loop is one kind of conversion.
-#[derive(Default)]
 pub(super) struct Lanes {
     center: [[f32; WIDTH]; 3],
     half_extent: [[f32; WIDTH]; 3],
@@ -113,34 +112,41 @@ impl Group {
 
     #[inline(always)]
     pub(super) fn decode(&self) -> Lanes {
-        // Plain loops, each over one kind of conversion: what the compiler turns into vectors.
-        let mut lanes = Lanes { center: self.center, ..Lanes::default() };
+        let half_extent = |axis: usize| {
+            each(|lane| {
+                f32::from(self.half_extent[axis][lane]) * node::scale(self.half_exponent[lane])
+            })
+        };
+        let mut axis = [[0.0; WIDTH]; 3];
         for lane in 0..WIDTH {
-            let scale = node::scale(self.half_exponent[lane]);
-            lanes.half_extent[0][lane] = f32::from(self.half_extent[0][lane]) * scale;
-            lanes.half_extent[1][lane] = f32::from(self.half_extent[1][lane]) * scale;
-            lanes.half_extent[2][lane] = f32::from(self.half_extent[2][lane]) * scale;
+            let [x, y, z] = node::decode_axis([self.axis[0][lane], self.axis[1][lane]]);
+            (axis[0][lane], axis[1][lane], axis[2][lane]) = (x, y, z);
         }
-        for lane in 0..WIDTH {
-            let axis = node::decode_axis([self.axis[0][lane], self.axis[1][lane]]);
-            lanes.axis[0][lane] = axis[0];
-            lanes.axis[1][lane] = axis[1];
-            lanes.axis[2][lane] = axis[2];
+        let is_endless = self.range == [0; WIDTH];
+        Lanes {
+            center: self.center,
+            half_extent: [half_extent(0), half_extent(1), half_extent(2)],
+            axis,
+            sin_half_theta_o: each(|lane| node::decode_sin_half_theta_o(self.theta_o[lane])),
+            cos_theta_e: each(|lane| node::decode_cos_theta_e(self.theta_e[lane])),
+            two_sided: each(|lane| u32::from(node::is_two_sided(self.theta_o[lane]))),
+            inverse_range2: if is_endless {
+                [0.0; WIDTH]
+            } else {
+                each(|lane| node::decode_inverse_range2(self.range[lane]))
+            },
         }
-        for lane in 0..WIDTH {
-            lanes.sin_half_theta_o[lane] = node::decode_sin_half_theta_o(self.theta_o[lane]);
-            lanes.two_sided[lane] = node::is_two_sided(self.theta_o[lane]).into();
-        }
-        for lane in 0..WIDTH {
-            lanes.cos_theta_e[lane] = node::decode_cos_theta_e(self.theta_e[lane]);
-        }
-        if self.range != [0; WIDTH] {
-            for lane in 0..WIDTH {
-                lanes.inverse_range2[lane] = node::decode_inverse_range2(self.range[lane]);
-            }
-        }
-        lanes
     }
+}
+
+/// One thing of each lane, by a plain loop: `array::from_fn` is not turned into vectors.
+#[inline(always)]
+fn each<T: Copy + Default>(of: impl Fn(usize) -> T) -> [T; WIDTH] {
+    let mut all = [T::default(); WIDTH];
+    for (lane, one) in all.iter_mut().enumerate() {
+        *one = of(lane);
+    }
+    all
 }
 
 impl Group {

@@ -86,7 +86,7 @@ fn contribution(
         if !vertex.lets_through(found.direction) {
             return None;
         }
-        let (reflected, bsdf_pdf) = vertex.bsdf.eval(vertex.wo, found.direction);
+        let (reflected, bsdf_pdf) = vertex.reflection.eval(found.direction);
         let pdf = found.pdf.unwrap_or(1.0);
         let value = Contribution {
             luminance: luminance(reflected * found.radiance) / pdf,

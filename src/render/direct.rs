@@ -56,7 +56,7 @@ impl Integrator<'_> {
         if !vertex.lets_through(incoming.direction) {
             return Rgb::ZERO;
         }
-        let (reflected, bsdf_pdf) = vertex.bsdf.eval(vertex.wo, incoming.direction);
+        let (reflected, bsdf_pdf) = vertex.reflection.eval(incoming.direction);
         let probability = pick.probability as f32;
         match incoming.pdf {
             None => reflected * incoming.radiance / probability,

@@ -6,7 +6,7 @@
 //! tree is asked how often it would have been picked from the point before. Where there is
 //! [fog](super::fog), every stretch of a path also gathers what scatters along it.
 
-use super::bsdf::Bsdf;
+use super::bsdf::Reflection;
 use super::camera::{CameraRay, CameraRays};
 use super::direct::power_heuristic;
 use super::fog::Fog;
@@ -90,7 +90,7 @@ pub struct Vertex {
     /// Where it is.
     pub anchor: Anchor,
     /// How it reflects.
-    pub bsdf: Bsdf,
+    pub reflection: Reflection,
     /// Towards the point before it, unit, world space.
     pub wo: Vec3,
     /// What the tree is asked for.
@@ -148,7 +148,7 @@ impl Integrator<'_> {
                 seen.depth_m = self.camera.depth_m(hit.anchor.position);
                 seen.normal = vertex.as_ref().map_or(hit.anchor.normal, |v| v.receiver.normal);
                 seen.albedo = vertex.as_ref().map_or(Rgb::ZERO, |v| {
-                    let (specular, diffuse) = v.bsdf.albedo(wo);
+                    let (specular, diffuse) = v.reflection.albedo();
                     specular + diffuse
                 });
             }
@@ -161,7 +161,7 @@ impl Integrator<'_> {
             seen.radiance += throughput * direct;
 
             let [lobe, bu, bv, _] = sampler.next_4d();
-            let Some(next) = vertex.bsdf.sample(wo, lobe, Vec2::new(bu, bv)) else { break };
+            let Some(next) = vertex.reflection.sample(lobe, Vec2::new(bu, bv)) else { break };
             if !vertex.lets_through(next.wi) {
                 break;
             }
@@ -205,7 +205,7 @@ impl Integrator<'_> {
             };
             let Some(vertex) = self.vertex(&hit, -direction) else { break };
             let [lobe, bu, bv, _] = sampler.next_4d();
-            let next = vertex.bsdf.sample(vertex.wo, lobe, Vec2::new(bu, bv));
+            let next = vertex.reflection.sample(lobe, Vec2::new(bu, bv));
             let next = next.filter(|next| vertex.lets_through(next.wi));
             let vertex = last.insert(vertex);
             let Some(next) = next else { break };
@@ -222,7 +222,8 @@ impl Integrator<'_> {
         };
         let surface = self.surfaces.at(instance, triangle, barycentric, hit.anchor, wo);
         let receiver = Receiver { point: hit.anchor.position, normal: surface.frame.normal };
-        Some(Vertex { anchor: hit.anchor, bsdf: surface.bsdf(), wo, receiver })
+        let reflection = surface.bsdf().toward(wo);
+        Some(Vertex { anchor: hit.anchor, reflection, wo, receiver })
     }
 
     /// What lights are picked for at a vertex.
@@ -315,14 +316,14 @@ impl Vertex {
     pub fn wanted(&self, sampler: Option<&mut Sampler>) -> Wanted {
         let receiver = self.receiver;
         let is_glossy = |lobes: &Lobes| lobes.at_normal + lobes.toward_grazing > 0.0;
-        let Some(lobes) = self.bsdf.toward(self.wo).filter(is_glossy) else {
+        let Some(lobes) = self.reflection.lobes().filter(is_glossy) else {
             return Wanted::At(receiver);
         };
         // A direction of its own: that which the path goes on in may hit a light, and then its weight
         // must not depend on it.
         let drawn = sampler.and_then(|sampler| {
             let [lobe, u, v, _] = sampler.next_4d();
-            self.bsdf.sample(self.wo, lobe, Vec2::new(u, v))
+            self.reflection.sample(lobe, Vec2::new(u, v))
         });
         let toward = drawn.map_or(receiver.normal, |sample| sample.wi);
         Wanted::Glossy(Glossy { receiver, to_eye: self.wo, lobes, toward })

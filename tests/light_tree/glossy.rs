@@ -25,7 +25,7 @@ fn surface() -> impl Strategy<Value = (Bsdf, Glossy)> {
             let sample =
                 SurfaceSample { base_color, metallic, roughness, dielectric_f0, dielectric_f90 };
             let bsdf = Bsdf::new(&sample, Frame::around(any.receiver.normal));
-            let lobes = bsdf.toward(any.to_eye)?;
+            let lobes = bsdf.toward(any.to_eye).lobes()?;
             Some((bsdf, Glossy { lobes, ..any }))
         },
     )
@@ -41,7 +41,7 @@ proptest! {
         prop_assume!(away.length() > 1e-2 && to_light.dot(receiver.receiver.normal) > 0.02);
         prop_assume!(receiver.to_eye.dot(receiver.receiver.normal) > 0.02);
         let node = Node::encode(&point_light(at, 3.0), Link::Emitter(0));
-        let (reflected, _) = bsdf.eval(receiver.to_eye, to_light);
+        let (reflected, _) = bsdf.toward(receiver.to_eye).eval(to_light);
         let expected = f64::from(3.0 * PI * luminance(reflected) / away.length_squared());
         let found = node.importance(&receiver);
         // The floor: a millionth of what a white surface would reflect.
@@ -99,12 +99,12 @@ fn a_reflection_is_found() {
             let point = Vec3::new(random(i, 10) - 0.5, 0.0, random(i, 11) - 0.5) * 20.0;
             let to_eye = Vec3::new(random(i, 12) - 0.5, 0.3, random(i, 13) - 0.5).normalize();
             let receiver = candelabra::light_tree::Receiver { point, normal: Vec3::Y };
-            let lobes = bsdf.toward(to_eye).unwrap();
+            let lobes = bsdf.toward(to_eye).lobes().unwrap();
             let glossy = Glossy { receiver, to_eye, lobes, toward: Vec3::Y };
             let contribution = |light: Picked, _: f64| {
                 let lamp = &lamps[light.emitter().unwrap() as usize];
                 let away = lamp.aabb.center() - point;
-                let (reflected, _) = bsdf.eval(to_eye, away.normalize());
+                let (reflected, _) = bsdf.toward(to_eye).eval(away.normalize());
                 f64::from(luminance(reflected) * lamp.energy / away.length_squared())
             };
             let [a, b] = [
@@ -116,6 +116,10 @@ fn a_reflection_is_found() {
             blind += b.variance / (b.mean * b.mean);
         }
     });
-    println!("relative variance: {:.4} knowing the surface, {:.4} not", knowing / 40.0, blind / 40.0);
+    println!(
+        "relative variance: {:.4} knowing the surface, {:.4} not",
+        knowing / 40.0,
+        blind / 40.0
+    );
     assert!(knowing < 0.1 * blind, "{knowing} {blind}");
 }

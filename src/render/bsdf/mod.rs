@@ -1,6 +1,7 @@
 //! How a surface reflects: Lambert below GGX, glTF's metallic-roughness model.
 //!
-//! A [`Bsdf`] is one shading point, with textures already looked up into a [`SurfaceSample`].
+//! A [`Bsdf`] is one shading point, with textures already looked up into a [`SurfaceSample`]; a
+//! [`Reflection`] is that point seen from one direction, `wo`.
 //! It is opaque and reflects on the side of its frame's normal alone; it knows nothing of
 //! materials, of emission or of the geometric normal (a caller that must not leak light through
 //! bent normals compares `wi` with the geometric normal itself).
@@ -23,7 +24,7 @@ pub mod ggx;
 #[cfg(test)]
 mod tests;
 
-use crate::light_tree;
+use crate::light_tree::Lobes;
 use crate::math::color::{Rgb, luminance};
 use crate::math::{Frame, warp};
 use albedo::Albedo;
@@ -51,8 +52,7 @@ pub struct SurfaceSample {
     pub dielectric_f90: f32,
 }
 
-/// A reflecting point. Directions are unit, world space, and point away from the surface; `wo`
-/// must be on the normal's side.
+/// A reflecting point. Directions are unit, world space, and point away from the surface.
 #[derive(Clone, Copy, Debug)]
 pub struct Bsdf {
     frame: Frame,
@@ -64,27 +64,32 @@ pub struct Bsdf {
     alpha: f32,
 }
 
-/// A direction drawn by [`Bsdf::sample`].
+/// A direction drawn by [`Reflection::sample`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BsdfSample {
     /// Where the light comes from, world space.
     pub wi: Vec3,
     /// `f |cos| / pdf`.
     pub weight: Rgb,
-    /// Density over solid angle, 1/sr; what [`Bsdf::eval`] gives for the same direction.
+    /// Density over solid angle, 1/sr; what [`Reflection::eval`] gives for the same direction.
     pub pdf: f32,
 }
 
-/// What is the same for every `wi` once `wo` is known.
-struct Lobes {
+/// A reflecting point seen from one side: what is the same for every `wi` once `wo` is known.
+#[derive(Clone, Copy, Debug)]
+pub struct Reflection {
+    frame: Frame,
+    /// In the shading frame.
     wo: Vec3,
     /// The specular lobe's colour is `at_normal + toward_grazing * (1 - cos_h)^5`.
     at_normal: Rgb,
     toward_grazing: Rgb,
     /// `base / pi`, less what the specular lobe has already reflected.
     diffuse: Rgb,
-    /// Probability of choosing the specular lobe.
-    specular_probability: f32,
+    alpha: f32,
+    /// Probability of choosing the specular lobe; `None` if nothing is reflected: `wo` is below the
+    /// horizon, or the surface is black.
+    specular_probability: Option<f32>,
 }
 
 impl Bsdf {
@@ -106,60 +111,20 @@ impl Bsdf {
         }
     }
 
-    /// `f(wo, wi) |cos wi|` and the density, 1/sr, with which [`sample`](Self::sample) draws `wi`.
-    /// Both are 0 if either direction is below the horizon.
-    #[inline]
-    pub fn eval(&self, wo: Vec3, wi: Vec3) -> (Rgb, f32) {
-        match self.lobes(wo) {
-            Some(lobes) => self.eval_local(&lobes, self.frame.to_local(wi)),
-            None => (Rgb::ZERO, 0.0),
-        }
-    }
-
-    /// Draws a direction. `None` if `wo` is below the horizon, the surface is black, or the
-    /// reflection went below the horizon: the path then ends without a contribution.
-    #[inline]
-    pub fn sample(&self, wo: Vec3, u_lobe: f32, u: Vec2) -> Option<BsdfSample> {
-        let lobes = self.lobes(wo)?;
-        let wi = if u_lobe < lobes.specular_probability {
-            let h = ggx::sample_normal(lobes.wo, self.alpha, u);
-            (2.0 * lobes.wo.dot(h) * h - lobes.wo).normalize()
-        } else {
-            warp::cosine_hemisphere(u)
-        };
-        let (value, pdf) = self.eval_local(&lobes, wi);
-        if pdf > 0.0 && pdf.is_finite() {
-            Some(BsdfSample { wi: self.frame.to_outer(wi), weight: value / pdf, pdf })
-        } else {
-            None
-        }
-    }
-
-    /// What it reflects towards `wo`, as picking lights asks for it; `None` below the horizon or if it
-    /// is black.
-    pub fn toward(&self, wo: Vec3) -> Option<light_tree::Lobes> {
-        let lobes = self.lobes(wo)?;
-        Some(light_tree::Lobes {
-            diffuse: luminance(lobes.diffuse) / FRAC_1_PI,
-            at_normal: luminance(lobes.at_normal),
-            toward_grazing: luminance(lobes.toward_grazing),
-            alpha: self.alpha,
-        })
-    }
-
-    /// Reflectance of the specular and of the diffuse lobe toward `wo`; their sum is the share of
-    /// a white environment that the surface reflects.
-    pub fn albedo(&self, wo: Vec3) -> (Rgb, Rgb) {
-        let Some(lobes) = self.lobes(wo) else { return (Rgb::ZERO, Rgb::ZERO) };
-        let part = Albedo::of_ggx(lobes.wo.z, self.alpha);
-        let specular = lobes.at_normal * (part.a + part.b) + lobes.toward_grazing * part.b;
-        (specular, lobes.diffuse / FRAC_1_PI)
-    }
-
-    fn lobes(&self, wo: Vec3) -> Option<Lobes> {
+    /// Towards `wo`.
+    pub fn toward(&self, wo: Vec3) -> Reflection {
         let wo = self.frame.to_local(wo);
+        let mut reflection = Reflection {
+            frame: self.frame,
+            wo,
+            at_normal: Rgb::ZERO,
+            toward_grazing: Rgb::ZERO,
+            diffuse: Rgb::ZERO,
+            alpha: self.alpha,
+            specular_probability: None,
+        };
         if wo.z <= 0.0 {
-            return None;
+            return reflection;
         }
         let whole = 1.0 - self.metallic;
         let part = Albedo::of_ggx(wo.z, self.alpha);
@@ -169,34 +134,79 @@ impl Bsdf {
         let coat = ((f0 * part.a + f90 * part.b) * coat_gain).min(Rgb::ONE);
         let metal_gain = Rgb::ONE + self.metal_f0 * lost;
         let metal = (self.metal_f0 * part.a + part.b) * metal_gain;
-        let diffuse = self.diffuse * (Rgb::ONE - coat);
-        let specular_albedo = (coat * whole + metal * self.metallic).element_sum();
-        let all = specular_albedo + diffuse.element_sum() / FRAC_1_PI;
-        (all > 0.0).then(|| Lobes {
-            wo,
-            at_normal: f0 * coat_gain * whole + self.metal_f0 * metal_gain * self.metallic,
-            toward_grazing: (f90 - f0) * coat_gain * whole
-                + (Rgb::ONE - self.metal_f0) * metal_gain * self.metallic,
-            diffuse,
-            specular_probability: specular_albedo / all,
+        reflection.diffuse = self.diffuse * (Rgb::ONE - coat);
+        reflection.at_normal = f0 * coat_gain * whole + self.metal_f0 * metal_gain * self.metallic;
+        reflection.toward_grazing = (f90 - f0) * coat_gain * whole
+            + (Rgb::ONE - self.metal_f0) * metal_gain * self.metallic;
+        let specular = (coat * whole + metal * self.metallic).element_sum();
+        let all = specular + reflection.diffuse.element_sum() / FRAC_1_PI;
+        reflection.specular_probability = (all > 0.0).then(|| specular / all);
+        reflection
+    }
+}
+
+impl Reflection {
+    /// `f |cos wi|` and the density, 1/sr, with which [`sample`](Self::sample) draws `wi`. Both are 0
+    /// if it is below the horizon.
+    #[inline]
+    pub fn eval(&self, wi: Vec3) -> (Rgb, f32) {
+        self.eval_local(self.frame.to_local(wi))
+    }
+
+    /// Draws a direction. `None` if nothing is reflected, or the reflection went below the horizon:
+    /// the path then ends without a contribution.
+    #[inline]
+    pub fn sample(&self, u_lobe: f32, u: Vec2) -> Option<BsdfSample> {
+        let wi = if u_lobe < self.specular_probability? {
+            let h = ggx::sample_normal(self.wo, self.alpha, u);
+            (2.0 * self.wo.dot(h) * h - self.wo).normalize()
+        } else {
+            warp::cosine_hemisphere(u)
+        };
+        let (value, pdf) = self.eval_local(wi);
+        if pdf > 0.0 && pdf.is_finite() {
+            Some(BsdfSample { wi: self.frame.to_outer(wi), weight: value / pdf, pdf })
+        } else {
+            None
+        }
+    }
+
+    /// Its lobes, as picking lights asks for them; `None` if nothing is reflected.
+    pub fn lobes(&self) -> Option<Lobes> {
+        self.specular_probability.map(|_| Lobes {
+            diffuse: luminance(self.diffuse) / FRAC_1_PI,
+            at_normal: luminance(self.at_normal),
+            toward_grazing: luminance(self.toward_grazing),
+            alpha: self.alpha,
         })
     }
 
-    #[inline]
-    fn eval_local(&self, lobes: &Lobes, wi: Vec3) -> (Rgb, f32) {
-        let (cos_o, cos_i) = (lobes.wo.z, wi.z);
-        if cos_i <= 0.0 {
-            return (Rgb::ZERO, 0.0);
+    /// Reflectance of the specular and of the diffuse lobe; their sum is the share of a white
+    /// environment that the surface reflects.
+    pub fn albedo(&self) -> (Rgb, Rgb) {
+        if self.specular_probability.is_none() {
+            return (Rgb::ZERO, Rgb::ZERO);
         }
-        let mut value = lobes.diffuse * cos_i;
-        let mut pdf = (1.0 - lobes.specular_probability) * warp::cosine_hemisphere_pdf(cos_i);
-        if lobes.specular_probability > 0.0 {
-            let h = (lobes.wo + wi).normalize_or(Vec3::Z);
-            let schlick = (1.0 - lobes.wo.dot(h)).clamp(0.0, 1.0).powi(5);
+        let part = Albedo::of_ggx(self.wo.z, self.alpha);
+        let specular = self.at_normal * (part.a + part.b) + self.toward_grazing * part.b;
+        (specular, self.diffuse / FRAC_1_PI)
+    }
+
+    #[inline]
+    fn eval_local(&self, wi: Vec3) -> (Rgb, f32) {
+        let (cos_o, cos_i) = (self.wo.z, wi.z);
+        let Some(specular_probability) = self.specular_probability.filter(|_| cos_i > 0.0) else {
+            return (Rgb::ZERO, 0.0);
+        };
+        let mut value = self.diffuse * cos_i;
+        let mut pdf = (1.0 - specular_probability) * warp::cosine_hemisphere_pdf(cos_i);
+        if specular_probability > 0.0 {
+            let h = (self.wo + wi).normalize_or(Vec3::Z);
+            let schlick = (1.0 - self.wo.dot(h)).clamp(0.0, 1.0).powi(5);
             let shape =
                 ggx::distribution(h, self.alpha) * ggx::visibility_cos(cos_o, cos_i, self.alpha);
-            value += (lobes.at_normal + lobes.toward_grazing * schlick) * shape;
-            pdf += lobes.specular_probability * ggx::reflection_pdf(cos_o, h, self.alpha);
+            value += (self.at_normal + self.toward_grazing * schlick) * shape;
+            pdf += specular_probability * ggx::reflection_pdf(cos_o, h, self.alpha);
         }
         (value, pdf)
     }

@@ -43,7 +43,7 @@ fn upright(sample: &SurfaceSample) -> Bsdf {
 fn furnace(bsdf: &Bsdf, wo: Vec3) -> f64 {
     let n = 16384;
     let sum: f64 = points(n)
-        .filter_map(|(lobe, u)| bsdf.sample(wo, lobe, u))
+        .filter_map(|(lobe, u)| bsdf.toward(wo).sample(lobe, u))
         .map(|s| f64::from(s.weight.x))
         .sum();
     sum / f64::from(n)
@@ -73,7 +73,7 @@ fn no_surface_creates_light_and_the_albedo_is_what_it_reflects() {
                 for cosine in COSINES {
                     let bsdf = upright(&sample);
                     let reflected = furnace(&bsdf, tilted(cosine));
-                    let (specular, diffuse) = bsdf.albedo(tilted(cosine));
+                    let (specular, diffuse) = bsdf.toward(tilted(cosine)).albedo();
                     let foretold = f64::from(specular.x + diffuse.x);
                     assert!(foretold <= 1.0 + 1e-5);
                     let error = (reflected - foretold).abs();
@@ -89,7 +89,7 @@ fn without_specular_it_is_exactly_lambertian() {
     let bsdf = upright(&lambert(0.5));
     for cosine in COSINES {
         let wi = Vec3::new(0.0, 0.6, 0.8);
-        let (value, pdf) = bsdf.eval(tilted(cosine), wi);
+        let (value, pdf) = bsdf.toward(tilted(cosine)).eval(wi);
         assert_eq!(value, Rgb::splat(0.5 * FRAC_1_PI * 0.8));
         assert_eq!(pdf, 0.8 * FRAC_1_PI);
     }
@@ -103,8 +103,8 @@ fn samples_carry_their_own_value_and_density() {
             let bsdf = Bsdf::new(&sample, frame);
             for cosine in COSINES {
                 let wo = frame.to_outer(tilted(cosine)).normalize();
-                for drawn in points(200).filter_map(|(lobe, u)| bsdf.sample(wo, lobe, u)) {
-                    let (value, pdf) = bsdf.eval(wo, drawn.wi);
+                for drawn in points(200).filter_map(|(lobe, u)| bsdf.toward(wo).sample(lobe, u)) {
+                    let (value, pdf) = bsdf.toward(wo).eval(drawn.wi);
                     // A mirror's density moves by percents within the rounding of a direction.
                     let tolerance = if roughness == 0.0 { 0.05 } else { 2e-3 };
                     assert!((pdf / drawn.pdf - 1.0).abs() < tolerance, "{pdf} {}", drawn.pdf);
@@ -128,7 +128,7 @@ fn mass(bsdf: &Bsdf, wo: Vec3, cell: [f32; 4], grid: usize) -> f64 {
         let z = z0 + (z1 - z0) * s / grid as f32;
         let (sin, cos) = (p0 + (p1 - p0) * t / grid as f32).sin_cos();
         let sine = (1.0 - z * z).sqrt();
-        sum += f64::from(bsdf.eval(wo, Vec3::new(sine * cos, sine * sin, z)).1);
+        sum += f64::from(bsdf.toward(wo).eval(Vec3::new(sine * cos, sine * sin, z)).1);
     }
     sum * f64::from((z1 - z0) * (p1 - p0)) / (grid * grid) as f64
 }
@@ -151,7 +151,7 @@ fn directions_fall_where_the_density_says() {
             };
             for _ in 0..n {
                 let (lobe, u) = (uniform(), Vec2::new(uniform(), uniform()));
-                let Some(drawn) = bsdf.sample(wo, lobe, u) else {
+                let Some(drawn) = bsdf.toward(wo).sample(lobe, u) else {
                     lost += 1;
                     continue;
                 };
@@ -196,7 +196,7 @@ fn the_horizon_and_the_mirror_stay_finite() {
             let wo = Vec3::new((1.0 - cosine * cosine).sqrt(), 0.0, cosine);
             let mirror = Vec3::new(-wo.x, 0.0, wo.z);
             for wi in [mirror, wo, Vec3::Z, Vec3::X, -Vec3::Z, Vec3::new(-1.0, 0.0, 1e-30)] {
-                let (value, pdf) = bsdf.eval(wo, wi);
+                let (value, pdf) = bsdf.toward(wo).eval(wi);
                 assert!(value.is_finite() && value.min_element() >= 0.0, "{value} {wo} {wi}");
                 assert!(pdf.is_finite() && pdf >= 0.0);
                 if cosine <= 0.0 || wi.z <= 0.0 {
@@ -206,7 +206,7 @@ fn the_horizon_and_the_mirror_stay_finite() {
             let corners = [0.0, 0.5, 1.0 - f32::EPSILON / 2.0];
             for i in 0..27 {
                 let (lobe, u, v) = (corners[i % 3], corners[i / 3 % 3], corners[i / 9]);
-                if let Some(drawn) = bsdf.sample(wo, lobe, Vec2::new(u, v)) {
+                if let Some(drawn) = bsdf.toward(wo).sample(lobe, Vec2::new(u, v)) {
                     assert!(cosine > 0.0 && drawn.weight.is_finite() && drawn.wi.is_finite());
                     assert!(drawn.weight.max_element() < 1e4, "{drawn:?} at {cosine}");
                 }
@@ -214,8 +214,8 @@ fn the_horizon_and_the_mirror_stay_finite() {
         }
     }
     let black = upright(&lambert(0.0));
-    assert_eq!(black.eval(Vec3::Z, Vec3::Z), (Rgb::ZERO, 0.0));
-    assert!(black.sample(Vec3::Z, 0.5, Vec2::splat(0.5)).is_none());
+    assert_eq!(black.toward(Vec3::Z).eval(Vec3::Z), (Rgb::ZERO, 0.0));
+    assert!(black.toward(Vec3::Z).sample(0.5, Vec2::splat(0.5)).is_none());
 }
 
 #[test]
@@ -228,8 +228,8 @@ fn single_scattering_is_reciprocal() {
     }
     let bsdf = upright(&lambert(0.7));
     let (a, b) = (tilted(0.3), tilted(0.8));
-    let forth = bsdf.eval(a, b).0 / b.z;
-    let back = bsdf.eval(b, a).0 / a.z;
+    let forth = bsdf.toward(a).eval(b).0 / b.z;
+    let back = bsdf.toward(b).eval(a).0 / a.z;
     assert!((forth - back).abs().max_element() < 1e-7);
 }
 
