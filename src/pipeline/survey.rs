@@ -54,8 +54,8 @@ pub struct PlacedLight {
     pub brightness: f32,
     /// Its emitters are numbered from here on.
     pub first_emitter: u32,
-    /// Its light.
-    light: u32,
+    /// Its light: a row of [`Survey::lights`].
+    pub light: u32,
 }
 
 /// Surveys a scene for some frames (ascending). If no light changes the frames do not matter.
@@ -78,7 +78,8 @@ pub fn survey(scene: &Scene, emitters: &Emitters, frames: &[i32]) -> Result<Surv
     let shared = surveyor.shared;
     check_total(emitters, &shared, &still, &frames)?;
     let lights = summaries(emitters, &shared, &still, &frames);
-    let fingerprint = whole(&lights, &frames);
+    let told = lights.iter().map(|light| (light.path.as_str(), light.class, &light.fingerprint));
+    let fingerprint = whole(told, frames.iter().map(|(frame, _)| *frame));
     Ok(Survey { shared, still, frames, lights, fingerprint })
 }
 
@@ -258,17 +259,19 @@ fn hash_bounds(bounds: &[LightBounds]) -> blake3::Hasher {
     hasher
 }
 
-fn whole(lights: &[LightSummary], frames: &[(i32, Group)]) -> [u8; 32] {
-    let mut hasher = blake3::Hasher::new();
-    hasher.update(&ALGORITHM_VERSION.to_le_bytes());
-    for light in lights {
-        hasher.update(&(light.path.len() as u64).to_le_bytes());
-        hasher.update(light.path.as_bytes());
-        hasher.update(&light.class.to_le_bytes());
-        hasher.update(&light.fingerprint);
+/// The fingerprint of a whole file, from what it says of its lights (path, class, fingerprint) and
+/// the frames for which something changes.
+pub(super) fn whole<'a>(
+    lights: impl Iterator<Item = (&'a str, u32, &'a [u8; 32])>,
+    frames: impl Iterator<Item = i32>,
+) -> [u8; 32] {
+    let mut bytes = ALGORITHM_VERSION.to_le_bytes().to_vec();
+    for (path, class, fingerprint) in lights {
+        bytes.extend_from_slice(&(path.len() as u64).to_le_bytes());
+        bytes.extend_from_slice(path.as_bytes());
+        bytes.extend_from_slice(&class.to_le_bytes());
+        bytes.extend_from_slice(fingerprint);
     }
-    for (frame, _) in frames {
-        hasher.update(&frame.to_le_bytes());
-    }
-    *hasher.finalize().as_bytes()
+    frames.for_each(|frame| bytes.extend_from_slice(&frame.to_le_bytes()));
+    *blake3::Hasher::new().update_rayon(&bytes).finalize().as_bytes()
 }
