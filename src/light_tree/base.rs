@@ -11,7 +11,6 @@ use super::node::Node;
 use super::records::{LightRow, TreeKind, TreeRow};
 use super::tree::LightTree;
 use super::writer::LightSummary;
-use std::cmp::Ordering;
 
 /// The base of a build.
 pub struct Base<'a> {
@@ -133,56 +132,44 @@ fn kind_of(tree: &LightTree<&[u8]>, row: u32) -> Option<TreeKind> {
     tree.trees().get(row as usize).and_then(TreeKind::of)
 }
 
-/// For each light the first emitter of the one in the tree that has the same class and content: the
-/// one of the same path, if that has not changed; else another, each once.
+/// For each light the first emitter of the one in the tree that has the same class and content, each
+/// once; `None` if there is none.
 fn same_lights(tree: &LightTree<&[u8]>, lights: &[LightSummary]) -> Vec<Option<u32>> {
     let rows = tree.lights();
     let mut found = vec![None; lights.len()];
-    let mut pair = |old: usize, new: usize| found[new] = Some(rows[old].first_emitter);
-    // Lights stand in the order of class and path.
-    let (old, new) = pair_up(
-        rows.iter()
-            .map(|row| (row.class, tree.light_path(row), row.fingerprint))
-            .zip(0..)
-            .collect(),
-        lights.iter().map(|l| (l.class, l.path.as_str(), l.fingerprint)).zip(0..).collect(),
-        &mut pair,
-    );
-    let by_content = |rest: Vec<((u32, &str, [u8; 32]), usize)>| {
-        let keys = rest.into_iter().map(|((class, _, content), row)| ((class, content), row));
-        let mut keys: Vec<_> = keys.collect();
-        keys.sort_unstable();
-        keys
-    };
-    pair_up(by_content(old), by_content(new), &mut pair);
-    found
-}
-
-/// Walks along two sorted lists, pairs up the rows of equal keys, and returns what has no partner.
-fn pair_up<K: Ord + Copy>(
-    old: Vec<(K, usize)>,
-    new: Vec<(K, usize)>,
-    mut pair: impl FnMut(usize, usize),
-) -> (Vec<(K, usize)>, Vec<(K, usize)>) {
-    let (mut alone_old, mut alone_new) = (Vec::new(), Vec::new());
-    let (mut i, mut j) = (0, 0);
-    while let (Some(&a), Some(&b)) = (old.get(i), new.get(j)) {
-        match a.0.cmp(&b.0) {
-            Ordering::Less => {
-                alone_old.push(a);
-                i += 1;
-            }
-            Ordering::Greater => {
-                alone_new.push(b);
-                j += 1;
-            }
-            Ordering::Equal => {
-                pair(a.1, b.1);
-                (i, j) = (i + 1, j + 1);
-            }
+    // Both stand in the order of class and path, and most have a partner where the other list is.
+    let (mut gone, mut come) = (Vec::new(), Vec::new());
+    let (mut old, mut new) = (0, 0);
+    while let (Some(row), Some(light)) = (rows.get(old), lights.get(new)) {
+        if (row.class, row.fingerprint) == (light.class, light.fingerprint) {
+            found[new] = Some(row.first_emitter);
+            (old, new) = (old + 1, new + 1);
+            continue;
+        }
+        let place = (row.class, tree.light_path(row)).cmp(&(light.class, &light.path));
+        if place.is_le() {
+            gone.push(old);
+            old += 1;
+        }
+        if place.is_ge() {
+            come.push(new);
+            new += 1;
         }
     }
-    alone_old.extend_from_slice(&old[i..]);
-    alone_new.extend_from_slice(&new[j..]);
-    (alone_old, alone_new)
+    gone.extend(old..rows.len());
+    come.extend(new..lights.len());
+    // Of the rest, those with the same content.
+    let content = |row: &LightRow| (row.class, row.fingerprint);
+    let content_of_new = |light: &LightSummary| (light.class, light.fingerprint);
+    gone.sort_by_key(|&old| content(&rows[old]));
+    come.sort_by_key(|&new| content_of_new(&lights[new]));
+    let mut gone = gone.into_iter().peekable();
+    for new in come {
+        let wanted = content_of_new(&lights[new]);
+        while gone.next_if(|&old| content(&rows[old]) < wanted).is_some() {}
+        if let Some(old) = gone.next_if(|&old| content(&rows[old]) == wanted) {
+            found[new] = Some(rows[old].first_emitter);
+        }
+    }
+    found
 }

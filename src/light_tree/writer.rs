@@ -166,6 +166,13 @@ impl<'a> LightTreeWriter<'a> {
         self.forced.extend_from_slice(instances);
     }
 
+    /// Adds lights, one after the other.
+    pub fn add_lights(&mut self, lights: &[LightSummary]) {
+        self.lights.reserve(lights.len());
+        self.paths.reserve(lights.iter().map(|light| light.path.len()).sum());
+        lights.iter().for_each(|light| self.add_light(light));
+    }
+
     /// Adds a light; its emitters are numbered after those of the lights before it.
     pub fn add_light(&mut self, light: &LightSummary) {
         self.lights.push(LightRow {

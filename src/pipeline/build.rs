@@ -7,6 +7,7 @@ use crate::light_tree::{ALGORITHM_VERSION, Base, LightTree, LightTreeWriter, Lin
 use crate::math::Similarity;
 use crate::store::AlignedBytes;
 use glam::{Affine3A, Mat3, Vec3};
+use std::borrow::Cow;
 use std::collections::HashMap;
 
 /// What a build is told besides the scene.
@@ -60,13 +61,22 @@ fn write(survey: &Survey, options: &BuildOptions, writer: LightTreeWriter) -> Re
         builder.frames(survey, still, below, &forced_still);
     }
     let mut writer = builder.writer;
-    survey.lights.iter().for_each(|light| writer.add_light(light));
+    writer.add_lights(&survey.lights);
     let meta = serde_json::json!({
         "program": options.program,
-        "algorithmVersion": ALGORITHM_VERSION,
+        ALGORITHM: ALGORITHM_VERSION,
     });
     let (leaves, reused) = (writer.leaf_count(), writer.reused_leaf_count());
     Rebuilt { bytes: writer.finish(&meta.to_string(), survey.fingerprint), leaves, reused }
+}
+
+/// Under which name `META` has the version of the algorithm.
+const ALGORITHM: &str = "algorithmVersion";
+
+/// The version of the algorithm that a file was built by, if it says so.
+pub(super) fn algorithm_of<D: AsRef<[u8]>>(tree: &LightTree<D>) -> Option<u32> {
+    let meta: serde_json::Value = serde_json::from_str(tree.meta()).ok()?;
+    meta[ALGORITHM].as_u64()?.try_into().ok()
 }
 
 /// In its own space a light numbers its emitters from 0 on.
@@ -147,14 +157,21 @@ impl Builder<'_> {
     }
 
     /// Their bounds.
-    fn bounds(&self, group: &Group, below: Option<&(Link, LightBounds)>) -> Vec<LightBounds> {
+    fn bounds<'g>(
+        &self,
+        group: &'g Group,
+        below: Option<&(Link, LightBounds)>,
+    ) -> Cow<'g, [LightBounds]> {
+        if group.placed.is_empty() && below.is_none() {
+            return Cow::Borrowed(&group.flat);
+        }
         let mut bounds = group.flat.clone();
         bounds.extend(group.placed.iter().map(|placed| {
             let own = self.writer.bounds_of(self.shared[placed.shared as usize]);
             in_world(&own, placed)
         }));
         bounds.extend(below.map(|(_, leaf)| *leaf));
-        bounds
+        Cow::Owned(bounds)
     }
 
     fn instances(&mut self, placed: &[PlacedLight]) -> Vec<u32> {

@@ -1,10 +1,10 @@
 //! Opening a tree file, and telling whether it still belongs to a scene.
 
+use super::build::algorithm_of;
 use super::frames::spell;
-use super::survey::whole;
 use super::{Survey, frames_of, survey};
 use crate::emitter::{Emitters, LightOverflow};
-use crate::light_tree::{LightSummary, LightTree};
+use crate::light_tree::{ALGORITHM_VERSION, LightSummary, LightTree};
 use crate::scene::Scene;
 use crate::store::{self, Mmap, StoreError};
 use std::collections::BTreeMap;
@@ -73,9 +73,7 @@ pub fn open_tree(path: &Path, verify: bool) -> Result<OpenedTree, TreeError> {
 /// If the file cannot be read, breaks a rule, or comes from another version.
 pub fn open_base(path: &Path) -> Result<OpenedTree, TreeError> {
     let tree = open_tree(path, true)?;
-    // The fingerprint covers the version of the algorithm: only the same one gets it from the lights.
-    let told = tree.lights().iter().map(|row| (tree.light_path(row), row.class, &row.fingerprint));
-    if whole(told, tree.frames().iter().map(|row| row.frame)) == tree.fingerprint() {
+    if algorithm_of(&tree) == Some(ALGORITHM_VERSION) {
         Ok(tree)
     } else {
         Err(TreeError::OtherAlgorithm { path: path.into() })

@@ -78,8 +78,7 @@ pub fn survey(scene: &Scene, emitters: &Emitters, frames: &[i32]) -> Result<Surv
     let shared = surveyor.shared;
     check_total(emitters, &shared, &still, &frames)?;
     let lights = summaries(emitters, &shared, &still, &frames);
-    let told = lights.iter().map(|light| (light.path.as_str(), light.class, &light.fingerprint));
-    let fingerprint = whole(told, frames.iter().map(|(frame, _)| *frame));
+    let fingerprint = whole(&lights, &frames);
     Ok(Survey { shared, still, frames, lights, fingerprint })
 }
 
@@ -245,7 +244,7 @@ fn summaries(
 /// Over every number of some bounds.
 fn hash_bounds(bounds: &[LightBounds]) -> blake3::Hasher {
     let mut hasher = blake3::Hasher::new();
-    let mut bytes = Vec::new();
+    let mut bytes = Vec::with_capacity(bounds.len() * size_of::<LightBounds>());
     for LightBounds { aabb, cone, energy, range_m } in bounds {
         for vector in [aabb.min, aabb.max, cone.axis] {
             bytes.extend_from_slice(bytemuck::bytes_of(&vector));
@@ -259,19 +258,16 @@ fn hash_bounds(bounds: &[LightBounds]) -> blake3::Hasher {
     hasher
 }
 
-/// The fingerprint of a whole file, from what it says of its lights (path, class, fingerprint) and
-/// the frames for which something changes.
-pub(super) fn whole<'a>(
-    lights: impl Iterator<Item = (&'a str, u32, &'a [u8; 32])>,
-    frames: impl Iterator<Item = i32>,
-) -> [u8; 32] {
+fn whole(lights: &[LightSummary], frames: &[(i32, Group)]) -> [u8; 32] {
     let mut bytes = ALGORITHM_VERSION.to_le_bytes().to_vec();
-    for (path, class, fingerprint) in lights {
-        bytes.extend_from_slice(&(path.len() as u64).to_le_bytes());
-        bytes.extend_from_slice(path.as_bytes());
-        bytes.extend_from_slice(&class.to_le_bytes());
-        bytes.extend_from_slice(fingerprint);
+    for light in lights {
+        bytes.extend_from_slice(&(light.path.len() as u64).to_le_bytes());
+        bytes.extend_from_slice(light.path.as_bytes());
+        bytes.extend_from_slice(&light.class.to_le_bytes());
+        bytes.extend_from_slice(&light.fingerprint);
     }
-    frames.for_each(|frame| bytes.extend_from_slice(&frame.to_le_bytes()));
+    for (frame, _) in frames {
+        bytes.extend_from_slice(&frame.to_le_bytes());
+    }
     *blake3::Hasher::new().update_rayon(&bytes).finalize().as_bytes()
 }

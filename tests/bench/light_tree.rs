@@ -4,7 +4,7 @@
 
 mod lights;
 
-use candelabra::bounds::LightBounds;
+use candelabra::bounds::{Aabb, Cone, LightBounds};
 use candelabra::emitter::Emitters;
 use candelabra::light_tree::{LightSummary, LightTree, LightTreeWriter, Link, Receiver, TreeKind};
 use candelabra::math::random::{hash, widen};
@@ -13,11 +13,34 @@ use candelabra::scene::Scene;
 use candelabra::store::AlignedBytes;
 use criterion::{Criterion, criterion_group};
 use glam::Vec3;
-use lights::{random, triangles};
+use lights::{place, random};
 use std::hint::black_box;
 use std::time::Duration;
 
 const EMITTERS: u32 = 1_000_000;
+
+fn direction(i: u32, n: u32) -> Vec3 {
+    let (z, phi) = (1.0 - 2.0 * random(i, n), std::f32::consts::TAU * random(i, n + 1));
+    let radius = (1.0 - z * z).sqrt();
+    Vec3::new(radius * phi.cos(), radius * phi.sin(), z)
+}
+
+/// Small triangles facing every way.
+fn triangles(count: u32) -> Vec<LightBounds> {
+    (0..count)
+        .map(|i| {
+            let a = place(i);
+            let (b, c) = (a + 0.05 * direction(i, 3), a + 0.05 * direction(i, 5));
+            let normal = (b - a).cross(c - a);
+            LightBounds {
+                aabb: Aabb::around([a, b, c]),
+                cone: Cone::flat(normal.normalize_or(Vec3::Z), false),
+                energy: normal.length() * (0.5 + random(i, 7)) + 1e-9,
+                range_m: f32::INFINITY,
+            }
+        })
+        .collect()
+}
 
 fn build(bounds: &[LightBounds]) -> AlignedBytes {
     let mut writer = LightTreeWriter::default();

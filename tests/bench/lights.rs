@@ -1,6 +1,5 @@
 //! Lights to build trees over: the same every time.
 
-use candelabra::bounds::{Aabb, Cone, LightBounds};
 use candelabra::math::random::hash;
 use candelabra::scene::{Light, LightKind, Node, Scene, Trs};
 use glam::{DQuat, DVec3, Vec3};
@@ -10,32 +9,9 @@ pub fn random(i: u32, n: u32) -> f32 {
     (hash(i, n) >> 8) as f32 / 16_777_216.0
 }
 
-fn direction(i: u32, n: u32) -> Vec3 {
-    let (z, phi) = (1.0 - 2.0 * random(i, n), std::f32::consts::TAU * random(i, n + 1));
-    let radius = (1.0 - z * z).sqrt();
-    Vec3::new(radius * phi.cos(), radius * phi.sin(), z)
-}
-
 /// A place in a box of 100 x 20 x 100 metres.
-fn place(i: u32) -> Vec3 {
+pub fn place(i: u32) -> Vec3 {
     Vec3::new(random(i, 0), 0.2 * random(i, 1), random(i, 2)) * 100.0
-}
-
-/// Small triangles facing every way.
-pub fn triangles(count: u32) -> Vec<LightBounds> {
-    (0..count)
-        .map(|i| {
-            let a = place(i);
-            let (b, c) = (a + 0.05 * direction(i, 3), a + 0.05 * direction(i, 5));
-            let normal = (b - a).cross(c - a);
-            LightBounds {
-                aabb: Aabb::around([a, b, c]),
-                cone: Cone::flat(normal.normalize_or(Vec3::Z), false),
-                energy: normal.length() * (0.5 + random(i, 7)) + 1e-9,
-                range_m: f32::INFINITY,
-            }
-        })
-        .collect()
 }
 
 /// A scene of point lights, each a prim of its own.

@@ -22,7 +22,8 @@ fn a_tree_that_is_up_to_date_is_left_alone() {
     let mut shot = Shot::still();
     let build = format!("build {SCENE} --output deep/er/it.ltree");
     shot.candelabra(&build).ends(0).keeps_quiet_about("up to date");
-    let written = || std::fs::metadata(shot.path("deep/er/it.ltree")).unwrap().modified().unwrap();
+    let file = shot.path("deep/er/it.ltree");
+    let written = || std::fs::metadata(&file).unwrap().modified().unwrap();
     let first = written();
     let whole = shot.read("deep/er/it.ltree");
     shot.candelabra(&build).ends(0).says("deep/er/it.ltree: up to date");
@@ -104,12 +105,19 @@ fn a_base_that_does_not_fit_is_not_used() {
     *damaged.last_mut().unwrap() ^= 1;
     shot.write("damaged.ltree", damaged);
     shot.write("notes.ltree", "these are notes");
-    // Its fingerprint is that of another content, as another version of the algorithm would give it.
+    // A later version of the algorithm has written it.
     let mut other = full.clone();
-    other[32] ^= 1;
+    let version = b"\"algorithmVersion\":";
+    let at = other.windows(version.len()).position(|bytes| bytes == version).unwrap();
+    other[at + version.len()] = b'9';
+    // Checksums: of `META`, the first section, in the table; of the table, in the header.
+    let number = |bytes: &[u8]| u64::from_le_bytes(bytes.try_into().unwrap()) as usize;
+    let (offset, length) = (number(&other[72..80]), number(&other[80..88]));
+    let checksum = crc32fast::hash(&other[offset..offset + length]);
+    other[92..96].copy_from_slice(&checksum.to_le_bytes());
     other[28..32].fill(0);
-    let rows = u32::from_le_bytes(other[24..28].try_into().unwrap()) as usize;
-    let checksum = crc32fast::hash(&other[..64 + 32 * rows]);
+    let sections = u32::from_le_bytes(other[24..28].try_into().unwrap()) as usize;
+    let checksum = crc32fast::hash(&other[..64 + 32 * sections]);
     other[28..32].copy_from_slice(&checksum.to_le_bytes());
     shot.write("other.ltree", other);
     for (base, why) in [

@@ -144,14 +144,12 @@ fn build(
     let rebuilt = pipeline::rebuild_tree(survey, &options, &tree);
     times.building = started.elapsed();
     let Rebuilt { bytes, reused, leaves } = rebuilt;
-    if reused > 0 {
-        let base = path.display();
-        writeln!(
-            out,
-            "{base}: {reused} of {leaves} leaves taken over, opened in {}",
-            Seconds(opening)
-        )?;
-    }
+    writeln!(
+        out,
+        "{}: {reused} of {leaves} leaves taken over, opened and verified in {}",
+        path.display(),
+        Seconds(opening)
+    )?;
     times.is_partial = reused > 0;
     Ok(bytes)
 }
@@ -186,7 +184,7 @@ impl Times {
                 let processes = (made.as_secs_f64() / saved.as_secs_f64()).ceil().max(1.0);
                 writeln!(
                     out,
-                    "; a process that opens it saves {}: the file has paid for itself with number {processes:.0}",
+                    "; a process that opens it saves {}: the file has paid for itself with process number {processes:.0}",
                     Seconds(saved)
                 )?;
             }

@@ -52,7 +52,10 @@ pub(super) fn build_tree(
         return None;
     }
     let items = order::canonical(bounds);
-    let reuse = earlier.map(|earlier| Reuse::new(earlier, &items, bounds));
+    let reuse = earlier.map(|earlier| {
+        out.reserve(earlier.groups.len());
+        Reuse::new(earlier, &items, bounds)
+    });
     let builder = Builder { bounds, items, link, reuse };
     let mut all: Vec<u32> = (0..bounds.len() as u32).collect();
     let around = builder.build_cluster(&mut all, 0, out);

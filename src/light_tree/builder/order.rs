@@ -11,14 +11,16 @@ use std::cmp::Ordering;
 
 /// The items along a Morton curve of their centres; equal places by every number they have.
 pub fn canonical(bounds: &[LightBounds]) -> Vec<Item> {
-    let mut keys: Vec<([u64; 2], u32)> = (bounds.par_iter().zip(0..bounds.len() as u32))
-        .map(|(b, index)| (place_on_curve(b.aabb.center()), index))
+    // The place on the curve, then the index: one number to sort by.
+    let mut keys: Vec<u128> = (bounds.par_iter().enumerate())
+        .map(|(index, b)| place_on_curve(b.aabb.center()) << 32 | index as u128)
         .collect();
-    keys.par_sort_unstable_by(|a, b| {
-        let ties = || total_order(&bounds[a.1 as usize], &bounds[b.1 as usize]);
-        a.0.cmp(&b.0).then_with(ties).then(a.1.cmp(&b.1))
-    });
-    keys.into_par_iter().map(|(_, index)| Item::new(&bounds[index as usize], index)).collect()
+    keys.par_sort_unstable();
+    let of = |key: &u128| &bounds[*key as u32 as usize];
+    for run in keys.chunk_by_mut(|a, b| a >> 32 == b >> 32) {
+        run.par_sort_by(|a, b| total_order(of(a), of(b)));
+    }
+    keys.par_iter().map(|key| Item::new(of(key), *key as u32)).collect()
 }
 
 /// A total order over every number of the bounds. Equal bounds may swap: nobody can tell, but by the
@@ -36,12 +38,13 @@ pub fn total_order(a: &LightBounds, b: &LightBounds) -> Ordering {
 
 /// Interleaved bits of the coordinates, 32 an axis. Their patterns, not their values: those ascend
 /// alike, over all magnitudes, and need no box around everything to be relative to.
-fn place_on_curve(p: Vec3) -> [u64; 2] {
+fn place_on_curve(p: Vec3) -> u128 {
     let axes = p.to_array().map(ascending_bits);
     let interleave = |bits: [u32; 3]| {
-        spread(bits[0].into()) | spread(bits[1].into()) << 1 | spread(bits[2].into()) << 2
+        let [x, y, z] = bits.map(|bits| spread(bits.into()));
+        u128::from(x | y << 1 | z << 2)
     };
-    [interleave(axes.map(|bits| bits >> 11)), interleave(axes.map(|bits| bits & 0x7ff))]
+    interleave(axes.map(|bits| bits >> 11)) << 33 | interleave(axes.map(|bits| bits & 0x7ff))
 }
 
 /// The bits of a number, changed so that they ascend with it.
