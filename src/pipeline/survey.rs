@@ -244,7 +244,7 @@ fn summaries(
 /// Over every number of some bounds.
 fn hash_bounds(bounds: &[LightBounds]) -> blake3::Hasher {
     let mut hasher = blake3::Hasher::new();
-    let mut bytes = Vec::with_capacity(bounds.len() * size_of::<LightBounds>());
+    let mut bytes = Vec::with_capacity(size_of_val(bounds));
     for LightBounds { aabb, cone, energy, range_m } in bounds {
         for vector in [aabb.min, aabb.max, cone.axis] {
             bytes.extend_from_slice(bytemuck::bytes_of(&vector));

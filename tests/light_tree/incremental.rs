@@ -176,6 +176,8 @@ fn is_same(file: File, rebuilt: &Rebuilt) -> bool {
 }
 
 proptest! {
+    #![proptest_config(ProptestConfig::with_cases(100))]
+
     #[test]
     fn any_edit_upon_any_base_gives_the_bytes_of_a_full_build(
         mut prims in prop::collection::vec(prim(), 0..120),
