@@ -125,7 +125,7 @@ impl<D: AsRef<[u8]>> LightTree<D> {
 impl Leaves {
     /// The slot where the way to an emitter leaves this tree, and the instance it goes on in, if it
     /// does.
-    fn find(&self, emitter: u32) -> Option<(Slot, Option<Placed>)> {
+    pub fn find(&self, emitter: u32) -> Option<(Slot, Option<Placed>)> {
         let own = emitter.checked_sub(self.first).and_then(|at| self.slots.get(at as usize));
         match own {
             Some(&slot) => Some((slot, None)).filter(|_| slot != NO_SLOT),

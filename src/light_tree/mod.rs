@@ -16,6 +16,7 @@
 //! | `wide` | the same code for wider vector registers |
 //! | `builder` | the partition (SAOH) and the bounds, deterministic and parallel |
 //! | `writer`, `records`, `tree` | the trees of a shot as a file, and that file opened |
+//! | `base` | what of an earlier version of the file has stayed the same |
 //! | `sampling` | picking an emitter |
 //! | `splitting`, `cut` | how many samples a viewer is worth; the clusters they are taken from |
 //! | `picks` | picking those, and how often each light is expected to be |
@@ -23,6 +24,7 @@
 //! | `variance` | how far off an estimate is, in closed form |
 //! | `verify` | proof that a file keeps the format's promises |
 
+mod base;
 mod builder;
 mod cut;
 mod glossy;
@@ -43,6 +45,7 @@ mod viewer;
 mod wide;
 mod writer;
 
+pub use base::Base;
 pub use builder::ALGORITHM_VERSION;
 pub use cut::{Picked, Scratch};
 pub use glossy::{Glossy, Lobes};

@@ -28,7 +28,7 @@ pub struct Node {
 }
 
 /// Where a node leads.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Link {
     /// Nowhere: the lane is not used.
     Nothing,
@@ -145,6 +145,10 @@ impl Node {
 
     pub(super) fn with_energy(self, energy: f32) -> Node {
         Node { energy, ..self }
+    }
+
+    pub(super) fn with_link(self, link: Link) -> Node {
+        Node { link: link.encode(), ..self }
     }
 
     /// Decoded for the importance.

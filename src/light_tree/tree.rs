@@ -47,6 +47,11 @@ impl<D: AsRef<[u8]>> LightTree<D> {
         })
     }
 
+    /// The same over a view of its bytes.
+    pub(super) fn by_reference(&self) -> LightTree<&[u8]> {
+        LightTree::open(self.container.bytes()).expect("these bytes have been opened before")
+    }
+
     /// The bytes of the file.
     pub fn into_bytes(self) -> D {
         self.container.into_bytes()

@@ -1,5 +1,6 @@
 //! Gathers the trees of a shot and lays them out as a file.
 
+use super::base::{Base, Leaf};
 use super::builder::build_tree;
 use super::group::{Group, WIDTH};
 use super::node::{Link, Node};
@@ -25,7 +26,9 @@ pub struct LightSummary {
 
 /// Builds the trees of a shot, one after the other, and writes them down.
 #[derive(Default)]
-pub struct LightTreeWriter {
+pub struct LightTreeWriter<'a> {
+    base: Option<Base<'a>>,
+    reused: usize,
     trees: Vec<TreeRow>,
     groups: Vec<Group>,
     instances: Vec<InstanceRow>,
@@ -36,7 +39,23 @@ pub struct LightTreeWriter {
     emitter_count: u32,
 }
 
-impl LightTreeWriter {
+impl<'a> LightTreeWriter<'a> {
+    /// A writer that takes over what has not changed from an earlier file. The bytes are the same as
+    /// without it.
+    pub fn upon(base: Base<'a>) -> LightTreeWriter<'a> {
+        LightTreeWriter { base: Some(base), ..LightTreeWriter::default() }
+    }
+
+    /// How many leaves the trees have so far.
+    pub fn leaf_count(&self) -> usize {
+        self.trees.iter().map(|tree| tree.leaf_count as usize).sum()
+    }
+
+    /// How many leaves were taken over from the base so far.
+    pub fn reused_leaf_count(&self) -> usize {
+        self.reused
+    }
+
     /// Builds a tree over some bounds and returns its row; `stands_for` tells what each of them is:
     /// an emitter or an instance of a tree added earlier. No bounds give no tree. Trees must be added
     /// in the order of their kinds.
@@ -47,7 +66,14 @@ impl LightTreeWriter {
         stands_for: impl Fn(usize) -> Link + Sync,
     ) -> Option<u32> {
         let first_group = self.groups.len();
-        let root = build_tree(bounds, &stands_for, &mut self.groups)?;
+        let leaves = (0..bounds.len()).map(|i| self.leaf(stands_for(i)));
+        let earlier = self.base.as_ref().and_then(|base| match kind {
+            TreeKind::Shared => None,
+            TreeKind::Still => base.still(leaves),
+            TreeKind::Frame => base.frame(self.frames.len(), leaves),
+        });
+        let (root, reused) = build_tree(bounds, &stands_for, earlier, &mut self.groups)?;
+        self.reused += reused;
         self.trees.push(TreeRow {
             first_group: first_group as u32,
             group_count: (self.groups.len() - first_group) as u32,
@@ -56,6 +82,31 @@ impl LightTreeWriter {
             root: Node::encode(&root, Link::Nothing),
         });
         Some(self.trees.len() as u32 - 1)
+    }
+
+    /// Adds the `nth` tree of its own that a light has in the base, and returns its row; `None` if the
+    /// light has changed. The light is named by its place among those of the new file.
+    pub fn add_tree_of_base(&mut self, light: usize, nth: usize) -> Option<u32> {
+        let (row, groups) = self.base.as_ref()?.own_tree(light, nth)?;
+        self.trees.push(TreeRow { first_group: self.groups.len() as u32, ..*row });
+        self.groups.extend_from_slice(groups);
+        self.reused += row.leaf_count as usize;
+        Some(self.trees.len() as u32 - 1)
+    }
+
+    fn leaf(&self, link: Link) -> Leaf {
+        match link {
+            Link::Instance(row) => {
+                let InstanceRow { tree, first_emitter, .. } = self.instances[row as usize];
+                let tree = self.trees[tree as usize];
+                match TreeKind::of(&tree) {
+                    Some(TreeKind::Shared) => Leaf::Emitter(first_emitter),
+                    _ => Leaf::Below(tree),
+                }
+            }
+            Link::Emitter(emitter) => Leaf::Emitter(emitter),
+            Link::Nothing | Link::Inner(_) => unreachable!("bounds stand for something"),
+        }
     }
 
     /// Adds a copy of the last tree, for a frame in which the same leaves stand in the same places
@@ -113,6 +164,13 @@ impl LightTreeWriter {
     /// Says which instances are of forced lights where there are no frames.
     pub fn add_forced(&mut self, instances: &[u32]) {
         self.forced.extend_from_slice(instances);
+    }
+
+    /// Adds lights, one after the other.
+    pub fn add_lights(&mut self, lights: &[LightSummary]) {
+        self.lights.reserve(lights.len());
+        self.paths.reserve(lights.iter().map(|light| light.path.len()).sum());
+        lights.iter().for_each(|light| self.add_light(light));
     }
 
     /// Adds a light; its emitters are numbered after those of the lights before it.

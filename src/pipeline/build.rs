@@ -3,10 +3,11 @@
 use super::Survey;
 use super::survey::{Group, PlacedLight};
 use crate::bounds::{Aabb, Cone, LightBounds};
-use crate::light_tree::{ALGORITHM_VERSION, LightTreeWriter, Link, TreeKind};
+use crate::light_tree::{ALGORITHM_VERSION, Base, LightTree, LightTreeWriter, Link, TreeKind};
 use crate::math::Similarity;
 use crate::store::AlignedBytes;
 use glam::{Affine3A, Mat3, Vec3};
+use std::borrow::Cow;
 use std::collections::HashMap;
 
 /// What a build is told besides the scene.
@@ -16,15 +17,36 @@ pub struct BuildOptions {
     pub program: String,
 }
 
+/// A file, built upon an earlier one.
+pub struct Rebuilt {
+    /// Its bytes: those that [`build_tree`] gives.
+    pub bytes: AlignedBytes,
+    /// How many leaves its trees have.
+    pub leaves: usize,
+    /// How many of them were taken over from the base.
+    pub reused: usize,
+}
+
 /// Builds the trees: one in its own space for each light that is shared, carried along or forced; one
 /// over what stands still; and one a frame over that tree and what changes. The same survey gives the
 /// same bytes.
 pub fn build_tree(survey: &Survey, options: &BuildOptions) -> AlignedBytes {
-    let mut builder = Builder { writer: LightTreeWriter::default(), shared: Vec::new() };
-    for shared in &survey.shared {
-        let tree = builder.writer.add_tree(TreeKind::Shared, &shared.bounds, own);
-        builder.shared.push(tree.expect("a light has emitters"));
-    }
+    write(survey, options, LightTreeWriter::default()).bytes
+}
+
+/// The same, in less time: copies every subtree of an earlier file whose lights have not changed. The
+/// base must come from [`open_base`](super::open_base).
+pub fn rebuild_tree<D: AsRef<[u8]>>(
+    survey: &Survey,
+    options: &BuildOptions,
+    base: &LightTree<D>,
+) -> Rebuilt {
+    write(survey, options, LightTreeWriter::upon(Base::new(base, &survey.lights)))
+}
+
+fn write(survey: &Survey, options: &BuildOptions, writer: LightTreeWriter) -> Rebuilt {
+    let mut builder = Builder { writer, shared: Vec::new() };
+    builder.share(survey);
     let links = builder.links(&survey.still, None);
     let bounds = builder.bounds(&survey.still, None);
     let still = builder.writer.add_tree(TreeKind::Still, &bounds, |i| links[i]);
@@ -39,12 +61,22 @@ pub fn build_tree(survey: &Survey, options: &BuildOptions) -> AlignedBytes {
         builder.frames(survey, still, below, &forced_still);
     }
     let mut writer = builder.writer;
-    survey.lights.iter().for_each(|light| writer.add_light(light));
+    writer.add_lights(&survey.lights);
     let meta = serde_json::json!({
         "program": options.program,
-        "algorithmVersion": ALGORITHM_VERSION,
+        ALGORITHM: ALGORITHM_VERSION,
     });
-    writer.finish(&meta.to_string(), survey.fingerprint)
+    let (leaves, reused) = (writer.leaf_count(), writer.reused_leaf_count());
+    Rebuilt { bytes: writer.finish(&meta.to_string(), survey.fingerprint), leaves, reused }
+}
+
+/// Under which name `META` has the version of the algorithm.
+const ALGORITHM: &str = "algorithmVersion";
+
+/// The version of the algorithm that a file was built by, if it says so.
+pub(super) fn algorithm_of<D: AsRef<[u8]>>(tree: &LightTree<D>) -> Option<u32> {
+    let meta: serde_json::Value = serde_json::from_str(tree.meta()).ok()?;
+    meta[ALGORITHM].as_u64()?.try_into().ok()
 }
 
 /// In its own space a light numbers its emitters from 0 on.
@@ -52,13 +84,35 @@ fn own(emitter: usize) -> Link {
     Link::Emitter(emitter as u32)
 }
 
-struct Builder {
-    writer: LightTreeWriter,
+struct Builder<'a> {
+    writer: LightTreeWriter<'a>,
     /// Row of the tree of each row of the survey's shared lights.
     shared: Vec<u32>,
 }
 
-impl Builder {
+impl Builder<'_> {
+    /// The trees of lights that have one of their own.
+    fn share(&mut self, survey: &Survey) {
+        let groups = || std::iter::once(&survey.still).chain(survey.frames.iter().map(|(_, g)| g));
+        let mut users = vec![Vec::new(); survey.shared.len()];
+        for placed in groups().flat_map(|group| group.placed.iter().chain(&group.forced)) {
+            users[placed.shared as usize].push(placed.light as usize);
+        }
+        // A forced light that moves has one a frame.
+        let mut trees_of = vec![0; survey.lights.len()];
+        for (shared, mut users) in survey.shared.iter().zip(users) {
+            users.sort_unstable();
+            users.dedup();
+            let unchanged = (users.iter())
+                .find_map(|&light| self.writer.add_tree_of_base(light, trees_of[light]));
+            users.iter().for_each(|&light| trees_of[light] += 1);
+            let tree = unchanged
+                .or_else(|| self.writer.add_tree(TreeKind::Shared, &shared.bounds, own))
+                .expect("a light has emitters");
+            self.shared.push(tree);
+        }
+    }
+
     fn frames(
         &mut self,
         survey: &Survey,
@@ -103,14 +157,21 @@ impl Builder {
     }
 
     /// Their bounds.
-    fn bounds(&self, group: &Group, below: Option<&(Link, LightBounds)>) -> Vec<LightBounds> {
+    fn bounds<'g>(
+        &self,
+        group: &'g Group,
+        below: Option<&(Link, LightBounds)>,
+    ) -> Cow<'g, [LightBounds]> {
+        if group.placed.is_empty() && below.is_none() {
+            return Cow::Borrowed(&group.flat);
+        }
         let mut bounds = group.flat.clone();
         bounds.extend(group.placed.iter().map(|placed| {
             let own = self.writer.bounds_of(self.shared[placed.shared as usize]);
             in_world(&own, placed)
         }));
         bounds.extend(below.map(|(_, leaf)| *leaf));
-        bounds
+        Cow::Owned(bounds)
     }
 
     fn instances(&mut self, placed: &[PlacedLight]) -> Vec<u32> {

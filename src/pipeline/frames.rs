@@ -1,4 +1,4 @@
-//! Which frames a shot has, where nobody says.
+//! Which frames a shot has, where nobody says; and how to say it.
 
 use crate::scene::{Channel, Keys, Scene};
 
@@ -23,4 +23,31 @@ pub fn frames_of(scene: &Scene) -> Vec<i32> {
     // A clock that runs for years is a slip of the exporter; let the user say what is meant.
     let last = (last.ceil() as i32).clamp(first, first.saturating_add(100_000));
     (first..=last).collect()
+}
+
+/// Writes frames, which ascend, as the programs read them: as a range if they are evenly spaced.
+pub(super) fn spell(frames: &[i32]) -> String {
+    let step = |pair: &[i32]| i64::from(pair[1]) - i64::from(pair[0]);
+    let mut steps = frames.windows(2).map(step);
+    match (frames, steps.next()) {
+        ([first, .., last], Some(by)) if steps.all(|step| step == by) => match by {
+            1 => format!("{first}-{last}"),
+            _ => format!("{first}-{last}x{by}"),
+        },
+        _ => frames.iter().map(i32::to_string).collect::<Vec<_>>().join(","),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::spell;
+    use crate::render::frames::Frames;
+
+    #[test]
+    fn what_is_written_is_read() {
+        for frames in [&[7][..], &[-3, -2, -1], &[1001, 1003, 1005], &[1, 2, 4], &[i32::MIN, 5]] {
+            let read: Frames = spell(frames).parse().unwrap();
+            assert_eq!(read.as_slice(), frames);
+        }
+    }
 }

@@ -1,8 +1,10 @@
 //! Opening a tree file, and telling whether it still belongs to a scene.
 
-use super::{Survey, survey};
+use super::build::algorithm_of;
+use super::frames::spell;
+use super::{Survey, frames_of, survey};
 use crate::emitter::{Emitters, LightOverflow};
-use crate::light_tree::{LightSummary, LightTree};
+use crate::light_tree::{ALGORITHM_VERSION, LightSummary, LightTree};
 use crate::scene::Scene;
 use crate::store::{self, Mmap, StoreError};
 use std::collections::BTreeMap;
@@ -39,6 +41,12 @@ pub enum TreeError {
         /// What changed.
         cause: StaleTree,
     },
+    /// It was built by another version of the algorithm.
+    #[error("{}: it was built by another version of the algorithm; build it again", path.display())]
+    OtherAlgorithm {
+        /// The file.
+        path: PathBuf,
+    },
     /// The scene has a light that no tree can hold.
     #[error(transparent)]
     Overflow(#[from] LightOverflow),
@@ -58,6 +66,20 @@ pub fn open_tree(path: &Path, verify: bool) -> Result<OpenedTree, TreeError> {
     Ok(tree)
 }
 
+/// Opens a tree file as the base of a build: one that is sound, and that this version of the
+/// algorithm has built.
+///
+/// # Errors
+/// If the file cannot be read, breaks a rule, or comes from another version.
+pub fn open_base(path: &Path) -> Result<OpenedTree, TreeError> {
+    let tree = open_tree(path, true)?;
+    if algorithm_of(&tree) == Some(ALGORITHM_VERSION) {
+        Ok(tree)
+    } else {
+        Err(TreeError::OtherAlgorithm { path: path.into() })
+    }
+}
+
 /// How many lights a message names.
 const MOST_NAMED: usize = 10;
 
@@ -70,6 +92,8 @@ pub struct StaleTree {
     pub removed: Vec<String>,
     /// Lights that are not what they were.
     pub dirtied: Vec<String>,
+    /// The command that builds it again, as a shell takes it.
+    pub remedy: String,
 }
 
 impl fmt::Display for StaleTree {
@@ -94,13 +118,14 @@ impl fmt::Display for StaleTree {
         if [&self.added, &self.removed, &self.dirtied].iter().all(|paths| paths.is_empty()) {
             write!(f, ": it was built by another version of the algorithm")?;
         }
-        write!(f, ". Build it again: candelabra build SCENE -o TREE")
+        write!(f, ". Build it again: {}", self.remedy)
     }
 }
 
 impl std::error::Error for StaleTree {}
 
-/// Compares a tree with the scene it should belong to.
+/// Compares a tree with the scene it should belong to. `forced` are the paths that the user wants
+/// forced besides what the scene itself forces: part of the command that a stale tree is mended by.
 ///
 /// # Errors
 /// [`TreeError::Stale`] with the lights that changed, at most ten of them named in the message;
@@ -110,11 +135,13 @@ pub fn check_fresh<D: AsRef<[u8]>>(
     path: &Path,
     scene: &Scene,
     emitters: &Emitters,
+    forced: &[String],
 ) -> Result<(), TreeError> {
     let frames: Vec<i32> = tree.frames().iter().map(|row| row.frame).collect();
     let Survey { lights, fingerprint, .. } = survey(scene, emitters, &frames)?;
     if fingerprint != tree.fingerprint() {
-        return Err(TreeError::Stale { path: path.into(), cause: compare(tree, &lights) });
+        let remedy = build_command(scene, path, &frames, forced);
+        return Err(TreeError::Stale { path: path.into(), cause: compare(tree, &lights, remedy) });
     }
     // Nobody may have verified the tree: its list of lights is not under the header's checksum.
     let told = tree.lights().iter().map(|row| (row.first_emitter, row.emitter_count, row.class));
@@ -126,7 +153,21 @@ pub fn check_fresh<D: AsRef<[u8]>>(
     Err(TreeError::Broken { path: path.into(), cause })
 }
 
-fn compare<D: AsRef<[u8]>>(tree: &LightTree<D>, now: &[LightSummary]) -> StaleTree {
+/// The command that builds a tree again for the frames that it was built for.
+fn build_command(scene: &Scene, tree: &Path, frames: &[i32], forced: &[String]) -> String {
+    let name = |path: &Path| path.display().to_string();
+    let mut words = ["candelabra", "build"].map(String::from).to_vec();
+    words.extend([name(&scene.source), "-o".into(), name(tree)]);
+    if !frames.is_empty() && frames != frames_of(scene) {
+        words.extend(["--frames".into(), spell(frames)]);
+    }
+    for path in forced {
+        words.extend(["--force-light".into(), path.clone()]);
+    }
+    shlex::try_join(words.iter().map(String::as_str)).unwrap_or_else(|_| words.join(" "))
+}
+
+fn compare<D: AsRef<[u8]>>(tree: &LightTree<D>, now: &[LightSummary], remedy: String) -> StaleTree {
     let before: BTreeMap<&str, _> = tree
         .lights()
         .iter()
@@ -144,5 +185,6 @@ fn compare<D: AsRef<[u8]>>(tree: &LightTree<D>, now: &[LightSummary]) -> StaleTr
                 .filter(|(path, now)| before.get(*path).is_some_and(|then| then != *now))
                 .map(|(path, _)| path),
         ),
+        remedy,
     }
 }

@@ -12,12 +12,12 @@ mod frames;
 mod fresh;
 mod survey;
 
-pub use build::{BuildOptions, build_tree};
+pub use build::{BuildOptions, Rebuilt, build_tree, rebuild_tree};
 pub use camera::{NoCamera, find_camera};
 pub use content::scene_fingerprint;
 pub use forced::{NoLightThere, force_lights};
 pub use frames::frames_of;
-pub use fresh::{OpenedTree, StaleTree, TreeError, check_fresh, open_tree};
+pub use fresh::{OpenedTree, StaleTree, TreeError, check_fresh, open_base, open_tree};
 pub use survey::{Group, PlacedLight, SharedBounds, Survey, survey};
 
 use crate::ingest::{self, IngestError};

@@ -54,8 +54,8 @@ pub struct PlacedLight {
     pub brightness: f32,
     /// Its emitters are numbered from here on.
     pub first_emitter: u32,
-    /// Its light.
-    light: u32,
+    /// Its light: a row of [`Survey::lights`].
+    pub light: u32,
 }
 
 /// Surveys a scene for some frames (ascending). If no light changes the frames do not matter.
@@ -244,7 +244,7 @@ fn summaries(
 /// Over every number of some bounds.
 fn hash_bounds(bounds: &[LightBounds]) -> blake3::Hasher {
     let mut hasher = blake3::Hasher::new();
-    let mut bytes = Vec::new();
+    let mut bytes = Vec::with_capacity(size_of_val(bounds));
     for LightBounds { aabb, cone, energy, range_m } in bounds {
         for vector in [aabb.min, aabb.max, cone.axis] {
             bytes.extend_from_slice(bytemuck::bytes_of(&vector));
@@ -259,16 +259,15 @@ fn hash_bounds(bounds: &[LightBounds]) -> blake3::Hasher {
 }
 
 fn whole(lights: &[LightSummary], frames: &[(i32, Group)]) -> [u8; 32] {
-    let mut hasher = blake3::Hasher::new();
-    hasher.update(&ALGORITHM_VERSION.to_le_bytes());
+    let mut bytes = ALGORITHM_VERSION.to_le_bytes().to_vec();
     for light in lights {
-        hasher.update(&(light.path.len() as u64).to_le_bytes());
-        hasher.update(light.path.as_bytes());
-        hasher.update(&light.class.to_le_bytes());
-        hasher.update(&light.fingerprint);
+        bytes.extend_from_slice(&(light.path.len() as u64).to_le_bytes());
+        bytes.extend_from_slice(light.path.as_bytes());
+        bytes.extend_from_slice(&light.class.to_le_bytes());
+        bytes.extend_from_slice(&light.fingerprint);
     }
     for (frame, _) in frames {
-        hasher.update(&frame.to_le_bytes());
+        bytes.extend_from_slice(&frame.to_le_bytes());
     }
-    *hasher.finalize().as_bytes()
+    *blake3::Hasher::new().update_rayon(&bytes).finalize().as_bytes()
 }

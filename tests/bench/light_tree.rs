@@ -2,24 +2,24 @@
 //!
 //! `cargo bench --bench light_tree`
 
+mod lights;
+
 use candelabra::bounds::{Aabb, Cone, LightBounds};
+use candelabra::emitter::Emitters;
 use candelabra::light_tree::{
     Glossy, LightSummary, LightTree, LightTreeWriter, Link, Lobes, Receiver, TreeKind,
 };
 use candelabra::math::random::{hash, widen};
-use candelabra::pipeline::open_tree;
+use candelabra::pipeline::{self, BuildOptions, open_tree};
+use candelabra::scene::Scene;
 use candelabra::store::AlignedBytes;
 use criterion::{Criterion, criterion_group};
 use glam::Vec3;
+use lights::{place, random};
 use std::hint::black_box;
 use std::time::Duration;
 
 const EMITTERS: u32 = 1_000_000;
-
-/// The `n`th number of stream `i`, in `[0, 1)`.
-fn random(i: u32, n: u32) -> f32 {
-    (hash(i, n) >> 8) as f32 / 16_777_216.0
-}
 
 fn direction(i: u32, n: u32) -> Vec3 {
     let (z, phi) = (1.0 - 2.0 * random(i, n), std::f32::consts::TAU * random(i, n + 1));
@@ -27,11 +27,11 @@ fn direction(i: u32, n: u32) -> Vec3 {
     Vec3::new(radius * phi.cos(), radius * phi.sin(), z)
 }
 
-/// Small triangles facing every way, in a box of 100 x 20 x 100 metres.
+/// Small triangles facing every way.
 fn triangles(count: u32) -> Vec<LightBounds> {
     (0..count)
         .map(|i| {
-            let a = Vec3::new(random(i, 0), 0.2 * random(i, 1), random(i, 2)) * 100.0;
+            let a = place(i);
             let (b, c) = (a + 0.05 * direction(i, 3), a + 0.05 * direction(i, 5));
             let normal = (b - a).cross(c - a);
             LightBounds {
@@ -122,6 +122,28 @@ fn benchmarks(criterion: &mut Criterion) {
     group.finish();
 }
 
+/// What a build upon an earlier file saves.
+fn one_changed(criterion: &mut Criterion) {
+    let mut group = criterion.benchmark_group("a hundred thousand lights, one changed");
+    group.sample_size(20);
+    let survey = |scene: &Scene| pipeline::survey(scene, &Emitters::collect(scene), &[1]).unwrap();
+    let options = BuildOptions::default();
+    let mut scene = lights::points(100_000);
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("before.ltree");
+    std::fs::write(&path, pipeline::build_tree(&survey(&scene), &options).as_ref()).unwrap();
+    lights::change_one(&mut scene);
+    let after = survey(&scene);
+    group.bench_function("build", |b| b.iter(|| pipeline::build_tree(&after, &options)));
+    group.bench_function("verify the base and build upon it", |b| {
+        b.iter(|| {
+            let base = pipeline::open_base(&path).unwrap();
+            pipeline::rebuild_tree(&after, &options, &base)
+        });
+    });
+    group.finish();
+}
+
 /// The most memory this process has used so far, bytes.
 fn peak_memory() -> Option<u64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
@@ -129,7 +151,7 @@ fn peak_memory() -> Option<u64> {
     Some(line.split_whitespace().nth(1)?.parse::<u64>().ok()? * 1024)
 }
 
-criterion_group!(timed, benchmarks);
+criterion_group!(timed, benchmarks, one_changed);
 
 fn main() {
     // First of all, while the process is small: what one build needs.

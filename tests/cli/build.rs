@@ -22,20 +22,147 @@ fn a_tree_that_is_up_to_date_is_left_alone() {
     let mut shot = Shot::still();
     let build = format!("build {SCENE} --output deep/er/it.ltree");
     shot.candelabra(&build).ends(0).keeps_quiet_about("up to date");
-    let written = || std::fs::metadata(shot.path("deep/er/it.ltree")).unwrap().modified().unwrap();
+    let file = shot.path("deep/er/it.ltree");
+    let written = || std::fs::metadata(&file).unwrap().modified().unwrap();
     let first = written();
+    let whole = shot.read("deep/er/it.ltree");
+    shot.candelabra(&build).ends(0).says("deep/er/it.ltree: up to date");
+    // Whatever of the scene is no light.
+    shot.edit(|json| json["nodes"][2]["translation"] = json!([0, 1, 4]));
     shot.candelabra(&build).ends(0).says("deep/er/it.ltree: up to date");
     assert_eq!(written(), first);
+    assert!(shot.read("deep/er/it.ltree") == whole);
     shot.candelabra(&format!("{build} --force")).ends(0).keeps_quiet_about("up to date");
     assert_ne!(written(), first);
     // Damaged or for another scene, it is built anew.
-    let whole = shot.read("deep/er/it.ltree");
     shot.write("deep/er/it.ltree", &whole[..whole.len() - 1]);
     shot.candelabra(&build).ends(0).keeps_quiet_about("up to date");
     assert_eq!(shot.read("deep/er/it.ltree"), whole);
     shot.edit(|json| json["nodes"][1]["translation"] = json!([0, 0, 2]));
     shot.candelabra(&build).ends(0).keeps_quiet_about("up to date");
     assert_ne!(shot.read("deep/er/it.ltree"), whole);
+}
+
+/// So many point lights in a row.
+fn lights(shot: &mut Shot, count: usize) {
+    shot.edit(|json| {
+        json["extensionsUsed"].as_array_mut().unwrap().push(json!("KHR_lights_punctual"));
+        json["extensions"]["KHR_lights_punctual"]["lights"] =
+            json!([{"type": "point"}, {"type": "point", "intensity": 7}]);
+        for i in 0..count {
+            let extension = json!({"KHR_lights_punctual": {"light": 0}});
+            let node = json!({"name": format!("bulb_{i}"), "translation": [i, i % 7, 3],
+                "extensions": extension});
+            json["nodes"].as_array_mut().unwrap().push(node);
+            json["scenes"][0]["nodes"].as_array_mut().unwrap().push(json!(3 + i));
+        }
+    });
+}
+
+fn strengthen(shot: &mut Shot, light: usize) {
+    shot.edit(|json| {
+        json["nodes"][3 + light]["extensions"]["KHR_lights_punctual"]["light"] = json!(1);
+    });
+}
+
+/// How many leaves were taken over, by the line that tells.
+#[track_caller]
+fn taken_over(out: &str, base: &str) -> usize {
+    let line = out.lines().find(|line| line.starts_with(base) && line.contains("taken over"));
+    let number = line.and_then(|line| line.split_whitespace().nth(1));
+    number.and_then(|number| number.parse().ok()).unwrap_or_else(|| panic!("{out}"))
+}
+
+#[test]
+fn a_build_takes_over_what_has_not_changed() {
+    let mut shot = Shot::still();
+    lights(&mut shot, 500);
+    shot.candelabra(&format!("build {SCENE} -o old.ltree")).ends(0).keeps_quiet_about("taken over");
+    shot.candelabra(&format!("build {SCENE}")).ends(0);
+    strengthen(&mut shot, 200);
+    let over = shot.candelabra(&format!("build {SCENE}")).ends(0);
+    assert!((400..502).contains(&taken_over(&over.out, "shot.ltree")), "{over:?}");
+    let upon = shot.candelabra(&format!("build {SCENE} -o new.ltree --base old.ltree")).ends(0);
+    assert!((400..502).contains(&taken_over(&upon.out, "old.ltree")), "{upon:?}");
+    shot.candelabra(&format!("build {SCENE} -o full.ltree --force"))
+        .ends(0)
+        .keeps_quiet_about("taken over");
+    shot.candelabra(&format!("build {SCENE} --force")).ends(0).keeps_quiet_about("taken over");
+    let full = shot.read("full.ltree");
+    for name in ["new.ltree", "shot.ltree"] {
+        assert!(shot.read(name) == full, "{name}");
+    }
+}
+
+/// A base that cannot be used is not worse than none, and said to be none.
+#[test]
+fn a_base_that_does_not_fit_is_not_used() {
+    let mut shot = Shot::still();
+    lights(&mut shot, 100);
+    shot.candelabra(&format!("build {SCENE} -o full.ltree")).ends(0);
+    let full = shot.read("full.ltree");
+    let mut damaged = full.clone();
+    *damaged.last_mut().unwrap() ^= 1;
+    shot.write("damaged.ltree", damaged);
+    shot.write("notes.ltree", "these are notes");
+    // A later version of the algorithm has written it.
+    let mut other = full.clone();
+    let version = b"\"algorithmVersion\":";
+    let at = other.windows(version.len()).position(|bytes| bytes == version).unwrap();
+    other[at + version.len()] = b'9';
+    // Checksums: of `META`, the first section, in the table; of the table, in the header.
+    let number = |bytes: &[u8]| u64::from_le_bytes(bytes.try_into().unwrap()) as usize;
+    let (offset, length) = (number(&other[72..80]), number(&other[80..88]));
+    let checksum = crc32fast::hash(&other[offset..offset + length]);
+    other[92..96].copy_from_slice(&checksum.to_le_bytes());
+    other[28..32].fill(0);
+    let sections = u32::from_le_bytes(other[24..28].try_into().unwrap()) as usize;
+    let checksum = crc32fast::hash(&other[..64 + 32 * sections]);
+    other[28..32].copy_from_slice(&checksum.to_le_bytes());
+    shot.write("other.ltree", other);
+    for (base, why) in [
+        ("damaged", "damaged"),
+        ("notes", "not a Candelabra tree file"),
+        ("absent", "No such file"),
+        ("other", "another version of the algorithm"),
+    ] {
+        let build = format!("build {SCENE} -o new.ltree --base {base}.ltree");
+        shot.candelabra(&build).ends(0).complains(&["note:", &format!("{base}.ltree"), why]);
+        assert!(shot.read("new.ltree") == full, "{base}");
+        std::fs::remove_file(shot.path("new.ltree")).unwrap();
+        // Nor is it when the output is such a file.
+        if base != "absent" {
+            let over = shot.candelabra(&format!("build {SCENE} -o {base}.ltree")).ends(0);
+            assert!(shot.read(&format!("{base}.ltree")) == full, "{base}: {over:?}");
+            shot.write(&format!("{base}.ltree"), &full[..100]);
+        }
+    }
+    Shot::still().candelabra(&format!("build {SCENE} --force --base a.ltree")).ends(2);
+}
+
+#[test]
+fn lights_are_known_by_their_content_not_by_their_names() {
+    let mut shot = Shot::still();
+    lights(&mut shot, 100);
+    shot.candelabra(&format!("build {SCENE} -o old.ltree")).ends(0);
+    let upon = |shot: &Shot| {
+        let told = shot.candelabra(&format!("build {SCENE} -o new.ltree --base old.ltree")).ends(0);
+        shot.candelabra(&format!("build {SCENE} -o full.ltree --force")).ends(0);
+        assert!(shot.read("new.ltree") == shot.read("full.ltree"));
+        taken_over(&told.out, "old.ltree")
+    };
+    shot.edit(|json| {
+        for (i, node) in json["nodes"].as_array_mut().unwrap().iter_mut().enumerate() {
+            node["name"] = json!(format!("renamed_{}", i * 37 % 103));
+        }
+    });
+    assert_eq!(upon(&shot), 102, "the bulbs and the two triangles of the lamp");
+    // A base of another scene has nothing to give.
+    shot.edit(|json| {
+        json["extensions"]["KHR_lights_punctual"]["lights"][0]["intensity"] = json!(3);
+        json["nodes"][1]["scale"] = json!([2, 1, 1]);
+    });
+    assert_eq!(upon(&shot), 0);
 }
 
 #[test]

@@ -30,13 +30,32 @@ fn a_stale_tree_names_what_changed_and_the_remedy() {
         "shot.ltree",
         "the tree is stale",
         "dirtied: /lamp",
-        "candelabra build SCENE -o TREE",
+        "Build it again: candelabra build shot.gltf -o shot.ltree",
     ]);
     shot.edit(|json| json["nodes"][1]["name"] = json!("lantern"));
     shot.render(RENDER).ends(3).complains(&["added: /lantern", "removed: /lamp"]);
     assert!(!shot.path("a.exr").exists());
     shot.candelabra(&format!("build {SCENE}")).ends(0);
     shot.render(RENDER).ends(0);
+}
+
+/// The command in the message, carried out as it stands, is the remedy.
+#[test]
+fn the_remedy_can_be_pasted() {
+    let mut shot = Shot::moving();
+    let options = "--force-light /lamp";
+    shot.candelabra(&format!("build {SCENE} {options} --frames 3-9x2 -o it's.ltree")).ends(0);
+    shot.edit(|json| json["nodes"][1]["scale"] = json!([0.5, 0.25, 1]));
+    let render = format!("--tree it's.ltree -o a.exr --frames 5 {options}");
+    let told = shot.render(&render).ends(3);
+    let command = told.err.lines().find_map(|line| line.split("again: candelabra ").nth(1));
+    let command = command.unwrap_or_else(|| panic!("{told:#?}"));
+    assert!(command.contains("--frames 3-9x2 --force-light /lamp"), "{command}");
+    let program = env!("CARGO_BIN_EXE_candelabra");
+    let mut shell = std::process::Command::new("sh");
+    shell.current_dir(shot.path("")).args(["-c", &format!("'{program}' {command}")]);
+    assert!(shell.output().unwrap().status.success(), "{command}");
+    shot.render(&render).ends(0);
 }
 
 #[test]

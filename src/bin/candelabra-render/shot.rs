@@ -41,7 +41,7 @@ pub fn render(arguments: &Arguments) -> Result<usize> {
     match &arguments.tree {
         Some(path) => {
             let tree = pipeline::open_tree(path, !arguments.no_verify)?;
-            pipeline::check_fresh(&tree, path, &scene, &emitters)?;
+            pipeline::check_fresh(&tree, path, &scene, &emitters, &arguments.force_light)?;
             render_frames(arguments, &scene, &emitters, &tree, camera, &frames)
         }
         None => {

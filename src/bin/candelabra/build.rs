@@ -3,9 +3,9 @@
 use anyhow::{Context, Result, bail};
 use candelabra::emitter::Emitters;
 use candelabra::light_tree::LightTree;
-use candelabra::pipeline::{self, BuildOptions, Survey};
+use candelabra::pipeline::{self, BuildOptions, OpenedTree, Rebuilt, Survey, TreeError};
 use candelabra::render::frames::Frames;
-use candelabra::store::write_atomically;
+use candelabra::store::{AlignedBytes, write_atomically};
 use clap::Args;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -29,8 +29,12 @@ pub struct Arguments {
     /// Threads; as many as there are cores if not given
     #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
-    /// Build even if the output is up to date
-    #[arg(long)]
+    /// A tree file of an earlier version of the scene, of which to take over what has not changed; the
+    /// output's own earlier version if not given
+    #[arg(long, value_name = "TREE")]
+    base: Option<PathBuf>,
+    /// Build even if the output is up to date, and all of it
+    #[arg(long, conflicts_with = "base")]
     force: bool,
 }
 
@@ -73,52 +77,121 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         emitters.changing_count(),
         Seconds(loaded),
     )?;
-    if !arguments.force && is_up_to_date(&output, &survey) {
+    // The output as it is: up to date, or what the new one is built upon.
+    let before = if arguments.force { None } else { Base::open(&output).ok() };
+    if before.as_ref().is_some_and(|before| before.tree.fingerprint() == survey.fingerprint) {
         writeln!(out, "{}: up to date", output.display())?;
         return Ok(());
     }
-
+    let base = match &arguments.base {
+        None => before,
+        Some(path) => match Base::open(path) {
+            Ok(base) => Some(base),
+            Err(error) => {
+                eprintln!("note: not built upon {error}");
+                None
+            }
+        },
+    };
+    let mut times = Times::default();
+    let bytes = build(&survey, base, &mut times, &mut out)?;
     let started = Instant::now();
-    let options =
-        BuildOptions { program: concat!("candelabra ", env!("CARGO_PKG_VERSION")).into() };
-    let bytes = pipeline::build_tree(&survey, &options);
-    let built = started.elapsed();
     // What is about to replace a good file must be one.
     let tree = LightTree::open(bytes).and_then(|tree| tree.verify().map(|()| tree));
     let bytes = tree.with_context(|| format!("{}: not written", output.display()))?.into_bytes();
     write_atomically(&output, |file| file.write_all(bytes.as_ref()))?;
+    times.writing = started.elapsed();
 
     let started = Instant::now();
     pipeline::open_tree(&output, true)?;
-    let opened = started.elapsed();
-    report(&mut out, &output, bytes.as_ref().len(), emitters.len(), built, opened)?;
+    times.opening = started.elapsed();
+    let size = bytes.as_ref().len();
+    let each = size as f64 / emitters.len().max(1) as f64;
+    writeln!(out, "{}: {size} bytes, {each:.1} an emitter", output.display())?;
+    times.report(&mut out)?;
     Ok(())
 }
 
-/// Whether the output is a sound tree of just this content.
-fn is_up_to_date(output: &Path, survey: &Survey) -> bool {
-    pipeline::open_tree(output, true).is_ok_and(|tree| tree.fingerprint() == survey.fingerprint)
+/// An earlier tree file, opened.
+struct Base {
+    path: PathBuf,
+    tree: OpenedTree,
+    opening: Duration,
 }
 
-fn report(
-    out: &mut impl Write,
-    output: &Path,
-    bytes: usize,
-    emitters: usize,
-    built: Duration,
-    opened: Duration,
-) -> Result<()> {
-    let each = bytes as f64 / emitters.max(1) as f64;
-    writeln!(out, "{}: {bytes} bytes, {each:.1} an emitter", output.display())?;
-    let (build, open) = (built.as_secs_f64(), opened.as_secs_f64());
-    write!(out, "built in {}, opens and verifies in {}: ", Seconds(built), Seconds(opened))?;
-    if build > open {
-        let renders = (build / (build - open)).ceil().max(2.0);
-        writeln!(out, "the file has paid for itself when {renders:.0} processes have used it")?;
-    } else {
-        writeln!(out, "building anew is as fast as opening; the file pays as a record")?;
+impl Base {
+    fn open(path: &Path) -> Result<Base, TreeError> {
+        let started = Instant::now();
+        let tree = pipeline::open_base(path)?;
+        Ok(Base { path: path.into(), tree, opening: started.elapsed() })
     }
-    Ok(())
+}
+
+fn build(
+    survey: &Survey,
+    base: Option<Base>,
+    times: &mut Times,
+    out: &mut impl Write,
+) -> Result<AlignedBytes> {
+    let options =
+        BuildOptions { program: concat!("candelabra ", env!("CARGO_PKG_VERSION")).into() };
+    let started = Instant::now();
+    let Some(Base { path, tree, opening }) = base else {
+        let bytes = pipeline::build_tree(survey, &options);
+        times.building = started.elapsed();
+        return Ok(bytes);
+    };
+    let rebuilt = pipeline::rebuild_tree(survey, &options, &tree);
+    times.building = started.elapsed();
+    let Rebuilt { bytes, reused, leaves } = rebuilt;
+    writeln!(
+        out,
+        "{}: {reused} of {leaves} leaves taken over, opened and verified in {}",
+        path.display(),
+        Seconds(opening)
+    )?;
+    times.is_partial = reused > 0;
+    Ok(bytes)
+}
+
+/// What it took to make the file, and what it takes to use it.
+#[derive(Default)]
+struct Times {
+    building: Duration,
+    /// Verifying, writing and syncing.
+    writing: Duration,
+    /// Opening and verifying.
+    opening: Duration,
+    /// Whether part of the tree was taken over from a base.
+    is_partial: bool,
+}
+
+impl Times {
+    fn report(&self, out: &mut impl Write) -> Result<()> {
+        let Times { building, writing, opening, is_partial } = *self;
+        write!(
+            out,
+            "built in {}, written in {}, opens and verifies in {}",
+            Seconds(building),
+            Seconds(writing),
+            Seconds(opening)
+        )?;
+        // Every process that builds its own tree spends `building`; with the file, `opening`.
+        match building.checked_sub(opening) {
+            _ if is_partial => writeln!(out)?,
+            Some(saved) if !saved.is_zero() => {
+                let made = building + writing;
+                let processes = (made.as_secs_f64() / saved.as_secs_f64()).ceil().max(1.0);
+                writeln!(
+                    out,
+                    "; a process that opens it saves {}: the file has paid for itself with process number {processes:.0}",
+                    Seconds(saved)
+                )?;
+            }
+            _ => writeln!(out, "; building anew is as fast as opening: the file pays as a record")?,
+        }
+        Ok(())
+    }
 }
 
 /// A duration with three digits.

@@ -1,16 +1,15 @@
 //! Bins: what a slab of a cluster holds, summed so that the partition's cost comes cheap.
 
-use super::Item;
-use crate::bounds::{Aabb, Cone, LightBounds};
+use super::item::Item;
+use crate::bounds::{Aabb, Cone};
 use glam::{DVec3, Vec3};
 use std::f32::consts::{FRAC_PI_2, PI, TAU};
 
 /// Box, energy and spread of orientations of some items, for costs only.
 ///
-/// The cone here is not the bound that nodes get but an estimate from the mean direction: normals
-/// spread evenly over a cap of half angle `theta_o` have a mean of length `(1 + cos theta_o) / 2`.
-/// Sums need no trigonometry and do not depend on the order of the items, so the axes of the scene
-/// are equals, which unions of cones, taken one after the other, cannot promise.
+/// The cone here is not the bound that nodes get but an estimate from the mean direction (see
+/// [`Item::directed`]). Sums need no trigonometry, and prefer none of the scene's axes, which unions
+/// of cones, taken one after the other, cannot promise.
 #[derive(Clone, Copy)]
 pub struct Bin {
     pub count: usize,
@@ -33,19 +32,19 @@ impl Bin {
     };
 
     pub fn of(item: &Item) -> Bin {
-        let LightBounds { aabb, cone, energy, .. } = item.bounds;
-        let energy = f64::from(energy);
-        let mean =
-            if cone.theta_o == 0.0 { 1.0 } else { 0.5 + 0.5 * f64::from(cone.theta_o.cos()) };
-        let axis = if cone.two_sided { upwards(cone.axis) } else { cone.axis };
-        Bin {
-            count: 1,
-            aabb,
-            energy,
-            directed: axis.as_dvec3() * (energy * mean),
-            theta_e: cone.theta_e,
-            two_sided: cone.two_sided,
-        }
+        let mut bin = Bin::EMPTY;
+        bin.add(item);
+        bin
+    }
+
+    #[inline]
+    pub fn add(&mut self, item: &Item) {
+        self.count += 1;
+        self.aabb = self.aabb.union(&item.aabb);
+        self.energy += f64::from(item.energy);
+        self.directed += item.directed.as_dvec3();
+        self.two_sided |= item.two_sided;
+        self.theta_e = self.theta_e.max(item.theta_e);
     }
 
     #[inline]
@@ -93,19 +92,6 @@ fn measure_of_faces(cos_o: f32, two_sided: bool) -> f32 {
 fn acos_of_positive(x: f32) -> f32 {
     (1.0 - x).max(0.0).sqrt()
         * (1.570_728_8 + x * (-0.212_114_4 + x * (0.074_261 - 0.018_729_3 * x)))
-}
-
-/// Of an axis and its opposite, the one whose largest component is positive.
-fn upwards(axis: Vec3) -> Vec3 {
-    let size = axis.abs();
-    let largest = if size.x >= size.y && size.x >= size.z {
-        axis.x
-    } else if size.y >= size.z {
-        axis.y
-    } else {
-        axis.z
-    };
-    axis * 1f32.copysign(largest)
 }
 
 /// Surface of a box plus a share of its squared diagonal: a measure that scales like an area and

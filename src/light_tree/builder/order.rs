@@ -1,29 +1,31 @@
 //! The canonical order of the items, by which the input's order is forgotten.
+//!
+//! Whether one item comes before another depends on these two alone. So the items of a cluster are
+//! in the same order whatever else the tree holds.
 
-use super::Item;
-use crate::bounds::{Aabb, LightBounds};
+use super::item::Item;
+use crate::bounds::LightBounds;
 use glam::Vec3;
 use rayon::prelude::*;
 use std::cmp::Ordering;
 
-/// The items along a Morton curve of their centres; equal codes by every number they have.
+/// The items along a Morton curve of their centres; equal places by every number they have.
 pub fn canonical(bounds: &[LightBounds]) -> Vec<Item> {
-    let centers = bounds.iter().map(|b| b.aabb.center());
-    let around = Aabb::around(centers);
-    let mut keys: Vec<(u64, u32)> = bounds
-        .par_iter()
-        .enumerate()
-        .map(|(i, b)| (morton(b.aabb.center(), &around), i as u32))
+    // The place on the curve, then the index: one number to sort by.
+    let mut keys: Vec<u128> = (bounds.par_iter().enumerate())
+        .map(|(index, b)| place_on_curve(b.aabb.center()) << 32 | index as u128)
         .collect();
-    keys.par_sort_unstable_by(|a, b| {
-        let ties = || total_order(&bounds[a.1 as usize], &bounds[b.1 as usize]);
-        a.0.cmp(&b.0).then_with(ties).then(a.1.cmp(&b.1))
-    });
-    keys.into_par_iter().map(|(_, index)| Item { bounds: bounds[index as usize], index }).collect()
+    keys.par_sort_unstable();
+    let of = |key: &u128| &bounds[*key as u32 as usize];
+    for run in keys.chunk_by_mut(|a, b| a >> 32 == b >> 32) {
+        run.par_sort_by(|a, b| total_order(of(a), of(b)));
+    }
+    keys.par_iter().map(|key| Item::new(of(key), *key as u32)).collect()
 }
 
-/// A total order over every number of the bounds. Equal bounds may swap: nobody can tell.
-fn total_order(a: &LightBounds, b: &LightBounds) -> Ordering {
+/// A total order over every number of the bounds. Equal bounds may swap: nobody can tell, but by the
+/// numbers of their emitters, which ascend.
+pub fn total_order(a: &LightBounds, b: &LightBounds) -> Ordering {
     let numbers = |bounds: &LightBounds| {
         let LightBounds { aabb, cone, energy, range_m } = *bounds;
         let vectors = [aabb.min, aabb.max, cone.axis].map(|v| v.to_array());
@@ -34,16 +36,21 @@ fn total_order(a: &LightBounds, b: &LightBounds) -> Ordering {
     pairs.map(|(x, y)| x.total_cmp(y)).find(|o| o.is_ne()).unwrap_or_else(|| ta.cmp(&tb))
 }
 
-/// Interleaved bits of a position in a box, 21 an axis.
-fn morton(p: Vec3, around: &Aabb) -> u64 {
-    let extent = around.extent().as_dvec3();
-    let offset = p.as_dvec3() - around.min.as_dvec3();
-    let cell = |offset: f64, extent: f64| {
-        if extent > 0.0 { (offset / extent * 2_097_151.0) as u64 } else { 0 }
+/// Interleaved bits of the coordinates, 32 an axis. Their patterns, not their values: those ascend
+/// alike, over all magnitudes, and need no box around everything to be relative to.
+fn place_on_curve(p: Vec3) -> u128 {
+    let axes = p.to_array().map(ascending_bits);
+    let interleave = |bits: [u32; 3]| {
+        let [x, y, z] = bits.map(|bits| spread(bits.into()));
+        u128::from(x | y << 1 | z << 2)
     };
-    spread(cell(offset.x, extent.x))
-        | spread(cell(offset.y, extent.y)) << 1
-        | spread(cell(offset.z, extent.z)) << 2
+    interleave(axes.map(|bits| bits >> 11)) << 33 | interleave(axes.map(|bits| bits & 0x7ff))
+}
+
+/// The bits of a number, changed so that they ascend with it.
+fn ascending_bits(x: f32) -> u32 {
+    let bits = x.to_bits();
+    bits ^ if x.is_sign_negative() { u32::MAX } else { 1 << 31 }
 }
 
 /// Puts two zero bits between any two of the low 21.
@@ -53,4 +60,25 @@ fn spread(x: u64) -> u64 {
     let x = (x | x << 8) & 0x100f_00f0_0f00_f00f;
     let x = (x | x << 4) & 0x10c3_0c30_c30c_30c3;
     (x | x << 2) & 0x1249_2492_4924_9249
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bits_ascend_with_the_numbers() {
+        let numbers = [f32::MIN, -1.5, -1e-40, -0.0, 0.0, 1e-40, 1.0, 1.0f32.next_up(), f32::MAX];
+        assert!(numbers.map(ascending_bits).is_sorted_by(|a, b| a < b));
+    }
+
+    #[test]
+    fn no_two_places_share_one_on_the_curve() {
+        let near = [1.0, 1.0f32.next_up(), 1.0f32.next_down(), -1.0, 1e6];
+        let places = near.iter().flat_map(|&x| near.map(|y| Vec3::new(x, y, x * y)));
+        let mut codes: Vec<_> = places.map(place_on_curve).collect();
+        codes.sort_unstable();
+        codes.dedup();
+        assert_eq!(codes.len(), near.len() * near.len());
+    }
 }

@@ -4,9 +4,12 @@
 //! orientation measure, times `Kr`, the longest extent of the cluster over its extent along the
 //! axis, which keeps boxes from getting thin. All three axes are tried; small clusters exactly,
 //! between every two neighbours, large ones between [bins](super::bins).
+//!
+//! A cluster is a list of the places of its items in the canonical order, ascending, and so are its
+//! halves: what becomes of a cluster depends on its items, not on those that it was cut away from.
 
-use super::Item;
 use super::bins::Bin;
+use super::item::Item;
 use crate::bounds::Aabb;
 use glam::Vec3;
 use rayon::prelude::*;
@@ -42,32 +45,29 @@ struct Cut {
     after: usize,
 }
 
-/// Reorders the items into two non-empty halves; `None` if all their centres coincide, so that no
-/// cut is better than another.
-pub fn partition(items: &mut [Item]) -> Option<Halves> {
-    if let [left, right] = items {
-        return Some(Halves { left_count: 1, cost: [Bin::of(left).cost(), Bin::of(right).cost()] });
+/// Reorders a cluster into two non-empty halves, each in canonical order; `None` if the centres of
+/// all its items coincide, so that no cut is better than another.
+pub fn partition(items: &[Item], cluster: &mut [u32]) -> Option<Halves> {
+    if let [left, right] = *cluster {
+        let cost = [left, right].map(|at| Bin::of(&items[at as usize]).cost());
+        return Some(Halves { left_count: 1, cost });
     }
-    let centers = center_box(items);
-    if items.len() <= EXACT_UP_TO {
-        partition_exactly(items, &centers)
+    let centers = center_box(items, cluster);
+    if cluster.len() <= EXACT_UP_TO {
+        partition_exactly(items, cluster, &centers)
     } else {
-        partition_binned(items, &centers)
+        partition_binned(items, cluster, &centers)
     }
 }
 
 /// The box around the items' centres.
-fn center_box(items: &[Item]) -> Aabb {
-    let around = |chunk: &[Item]| Aabb::around(chunk.iter().map(center));
-    if items.len() <= CHUNK {
-        around(items)
+fn center_box(items: &[Item], cluster: &[u32]) -> Aabb {
+    let around = |part: &[u32]| Aabb::around(part.iter().map(|&at| items[at as usize].center()));
+    if cluster.len() <= CHUNK {
+        around(cluster)
     } else {
-        items.par_chunks(CHUNK).map(around).reduce(|| Aabb::EMPTY, |a, b| a.union(&b))
+        cluster.par_chunks(CHUNK).map(around).reduce(|| Aabb::EMPTY, |a, b| a.union(&b))
     }
-}
-
-fn center(item: &Item) -> Vec3 {
-    item.bounds.aabb.center()
 }
 
 /// `Kr` for each axis; no cut along an axis without extent.
@@ -76,47 +76,59 @@ fn regularisation(centers: &Aabb) -> [Option<f64>; 3] {
     extent.to_array().map(|along| (along > 0.0).then(|| extent.max_element() / along))
 }
 
-fn partition_exactly(items: &mut [Item], centers: &Aabb) -> Option<Halves> {
-    let count = items.len();
+fn partition_exactly(items: &[Item], cluster: &mut [u32], centers: &Aabb) -> Option<Halves> {
+    let count = cluster.len();
     let mut best: Option<Cut> = None;
-    let sort = |items: &mut [Item], axis: usize| {
-        items.sort_by(|a, b| center(a)[axis].total_cmp(&center(b)[axis]));
+    let mut entries = [(Vec3::ZERO, Bin::EMPTY); EXACT_UP_TO];
+    for (entry, &at) in entries.iter_mut().zip(cluster.iter()) {
+        let item = &items[at as usize];
+        *entry = (item.center(), Bin::of(item));
+    }
+    // Which of the entries are how far along an axis; ties in canonical order.
+    let sorted = |axis: usize| {
+        let mut order: [u8; EXACT_UP_TO] = std::array::from_fn(|i| i as u8);
+        let along = |i: &u8| entries[usize::from(*i)].0[axis];
+        order[..count].sort_by(|a, b| along(a).total_cmp(&along(b)));
+        order
     };
-    let mut sorted = [items[0]; EXACT_UP_TO];
-    let sorted = &mut sorted[..count];
     let mut bins = [Bin::EMPTY; BINS];
     for (axis, kr) in regularisation(centers).into_iter().enumerate() {
         let Some(kr) = kr else { continue };
-        // Each axis sorts the canonical order anew, so that ties do not depend on other axes.
-        sorted.copy_from_slice(items);
-        sort(sorted, axis);
-        for (bin, item) in bins.iter_mut().zip(sorted.iter()) {
-            *bin = Bin::of(item);
+        for (bin, i) in bins[..count].iter_mut().zip(sorted(axis)) {
+            *bin = entries[usize::from(i)].1;
         }
         cheapest_cut(&bins[..count], axis, kr, &mut best);
     }
     let cut = best?;
-    sort(items, cut.axis);
-    Some(Halves { left_count: cut.after + 1, cost: cut.cost })
+    let left_count = cut.after + 1;
+    let mut order = sorted(cut.axis);
+    order[..left_count].sort_unstable();
+    order[left_count..count].sort_unstable();
+    let mut places = [0; EXACT_UP_TO];
+    places[..count].copy_from_slice(cluster);
+    for (place, i) in cluster.iter_mut().zip(order) {
+        *place = places[usize::from(i)];
+    }
+    Some(Halves { left_count, cost: cut.cost })
 }
 
-fn partition_binned(items: &mut [Item], centers: &Aabb) -> Option<Halves> {
+fn partition_binned(items: &[Item], cluster: &mut [u32], centers: &Aabb) -> Option<Halves> {
     let slabs = Slabs::new(centers);
-    let fill = |chunk: &[Item]| {
+    let fill = |part: &[u32]| {
         let mut bins = [[Bin::EMPTY; BINS]; 3];
-        for item in chunk {
-            let at = slabs.of(center(item));
-            let entry = Bin::of(item);
+        for &place in part {
+            let item = &items[place as usize];
+            let at = slabs.of(item.center());
             for axis in 0..3 {
-                bins[axis][at[axis]].merge(&entry);
+                bins[axis][at[axis]].add(item);
             }
         }
         bins
     };
-    let bins = if items.len() <= CHUNK {
-        fill(items)
+    let bins = if cluster.len() <= CHUNK {
+        fill(cluster)
     } else {
-        let parts: Vec<_> = items.par_chunks(CHUNK).map(fill).collect();
+        let parts: Vec<_> = cluster.par_chunks(CHUNK).map(fill).collect();
         let mut total = [[Bin::EMPTY; BINS]; 3];
         for part in &parts {
             for (sum, bin) in total.as_flattened_mut().iter_mut().zip(part.as_flattened()) {
@@ -132,8 +144,8 @@ fn partition_binned(items: &mut [Item], centers: &Aabb) -> Option<Halves> {
         }
     }
     let Cut { axis, after, cost, .. } = best?;
-    let left_count = move_to_front(items, |item| slabs.of(center(item))[axis] <= after);
-    Some(Halves { left_count, cost })
+    let is_left = |place: u32| slabs.of(items[place as usize].center())[axis] <= after;
+    Some(Halves { left_count: move_to_front(cluster, is_left), cost })
 }
 
 /// Tries every cut between bins; keeps the first of equals.
@@ -177,19 +189,35 @@ impl Slabs {
     }
 }
 
-/// Brings the items that fulfil a condition to the front, in place, and counts them.
-fn move_to_front(items: &mut [Item], wanted: impl Fn(&Item) -> bool) -> usize {
-    let (mut front, mut back) = (0, items.len());
-    loop {
-        while front < back && wanted(&items[front]) {
-            front += 1;
-        }
-        while front < back && !wanted(&items[back - 1]) {
-            back -= 1;
-        }
-        if front >= back {
-            return front;
-        }
-        items.swap(front, back - 1);
+/// Brings what fulfils a condition to the front and counts it; both parts keep their order.
+fn move_to_front(cluster: &mut [u32], wanted: impl Fn(u32) -> bool + Sync) -> usize {
+    if cluster.len() <= CHUNK {
+        return move_part_to_front(cluster, &wanted);
     }
+    let parts = cluster.par_chunks_mut(CHUNK);
+    let counts: Vec<usize> = parts.map(|part| move_part_to_front(part, &wanted)).collect();
+    let (mut front, mut others) = (0, Vec::with_capacity(cluster.len()));
+    for (i, count) in counts.into_iter().enumerate() {
+        let (start, end) = (i * CHUNK, cluster.len().min((i + 1) * CHUNK));
+        others.extend_from_slice(&cluster[start + count..end]);
+        cluster.copy_within(start..start + count, front);
+        front += count;
+    }
+    cluster[front..].copy_from_slice(&others);
+    front
+}
+
+fn move_part_to_front(part: &mut [u32], wanted: impl Fn(u32) -> bool) -> usize {
+    let (mut front, mut others) = (0, Vec::with_capacity(part.len()));
+    for at in 0..part.len() {
+        let place = part[at];
+        if wanted(place) {
+            part[front] = place;
+            front += 1;
+        } else {
+            others.push(place);
+        }
+    }
+    part[front..].copy_from_slice(&others);
+    front
 }

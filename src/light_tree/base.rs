@@ -1,0 +1,175 @@
+//! An earlier version of a file, and what of it has stayed the same.
+//!
+//! Lights are compared by their fingerprints, which cover all that a tree depends on. One that has
+//! the fingerprint of a light of the base is unchanged, whatever it is called now and wherever it
+//! stands among the others.
+
+use super::builder::{CHANGED, Earlier};
+use super::group::{Group, WIDTH};
+use super::leaves::Leaves;
+use super::node::Node;
+use super::records::{LightRow, TreeKind, TreeRow};
+use super::tree::LightTree;
+use super::writer::LightSummary;
+
+/// The base of a build.
+pub struct Base<'a> {
+    tree: LightTree<&'a [u8]>,
+    /// For each light of the new file its first emitter, ascending.
+    firsts: Vec<u32>,
+    /// And the first emitter of the light of the base that it equals.
+    old_firsts: Vec<Option<u32>>,
+    /// The first emitters of lights that are placed, and the rows of their trees; both ascending.
+    placed: Vec<(u32, u32)>,
+}
+
+impl<'a> Base<'a> {
+    /// Compares the lights of a new file, in their order, with those of an earlier one, which must be
+    /// sound (see [`verify`](LightTree::verify)) and built by this version of the algorithm.
+    pub fn new<D: AsRef<[u8]>>(tree: &'a LightTree<D>, lights: &[LightSummary]) -> Base<'a> {
+        let tree = tree.by_reference();
+        let mut next = 0;
+        let first = |light: &LightSummary| {
+            next += light.emitter_count;
+            next - light.emitter_count
+        };
+        let placed = tree.instances().iter().map(|row| (row.first_emitter, row.tree));
+        let is_shared = |(_, row): &(u32, u32)| kind_of(&tree, *row) == Some(TreeKind::Shared);
+        let mut placed: Vec<_> = placed.filter(is_shared).collect();
+        placed.sort_unstable();
+        placed.dedup();
+        Base {
+            firsts: lights.iter().map(first).collect(),
+            old_firsts: same_lights(&tree, lights),
+            placed,
+            tree,
+        }
+    }
+
+    /// The `nth` tree of its own that a light has, if the light has not changed.
+    pub(super) fn own_tree(&self, light: usize, nth: usize) -> Option<(&TreeRow, &[Group])> {
+        let old = (*self.old_firsts.get(light)?)?;
+        let first = self.placed.partition_point(|&(emitter, _)| emitter < old);
+        let &(emitter, row) = self.placed.get(first + nth)?;
+        let tree = &self.tree.trees()[row as usize];
+        (emitter == old).then(|| (tree, self.tree.groups_of(tree)))
+    }
+
+    /// The tree of what stands still, and where in it the leaves of the new one are.
+    pub(super) fn still(&self, leaves: impl Iterator<Item = Leaf>) -> Option<Earlier<'_>> {
+        Some(self.earlier(self.still_row()?, 0..self.tree.first_of_class(LightRow::PLACED), leaves))
+    }
+
+    /// The same of the tree of a frame, by its place among the frames.
+    pub(super) fn frame(
+        &self,
+        frame: usize,
+        leaves: impl Iterator<Item = Leaf>,
+    ) -> Option<Earlier<'_>> {
+        let row = self.tree.frames().get(frame)?.tree;
+        let is_own = kind_of(&self.tree, row) == Some(TreeKind::Frame) && !self.is_copy(row);
+        let first = |class| self.tree.first_of_class(class);
+        let own = first(LightRow::CHANGES)..first(LightRow::CHANGES | LightRow::PLACED);
+        is_own.then(|| self.earlier(&self.tree.trees()[row as usize], own, leaves))
+    }
+
+    fn still_row(&self) -> Option<&TreeRow> {
+        self.tree.trees().iter().find(|row| TreeKind::of(row) == Some(TreeKind::Still))
+    }
+
+    /// Whether the tree of a frame may have got its clusters from the one before it, instead of
+    /// from a build: whether they differ in energies alone.
+    fn is_copy(&self, row: u32) -> bool {
+        let [before, own] =
+            [row.wrapping_sub(1), row].map(|row| self.tree.trees().get(row as usize));
+        let (Some(before), Some(own)) = (before, own) else { return false };
+        let dull = |row| {
+            let nodes = self.tree.groups_of(row).iter().flat_map(Group::nodes);
+            nodes.map(|node| bytemuck::cast::<Node, [u8; 32]>(node.with_energy(1.0)))
+        };
+        before.kind == own.kind && dull(before).eq(dull(own))
+    }
+
+    fn earlier(
+        &self,
+        row: &TreeRow,
+        own: std::ops::Range<u32>,
+        leaves: impl Iterator<Item = Leaf>,
+    ) -> Earlier<'_> {
+        let old: Leaves = self.tree.leaves_of(row, own);
+        let still = self.still_row().map(|row| bytemuck::bytes_of(&row.root));
+        let mut light = 0;
+        let slot = |leaf: Leaf| match leaf {
+            Leaf::Below(tree) => {
+                old.below.filter(|_| still == Some(bytemuck::bytes_of(&tree.root)))
+            }
+            Leaf::Emitter(emitter) => {
+                // Leaves come in the order of their emitters.
+                while self.firsts.get(light + 1).is_some_and(|&next| next <= emitter) {
+                    light += 1;
+                }
+                let within = emitter.checked_sub(*self.firsts.get(light)?)?;
+                let old_emitter = self.old_firsts[light]? + within;
+                old.find(old_emitter).map(|(slot, _)| slot)
+            }
+        };
+        let first = row.first_group * WIDTH as u32;
+        let slots = leaves.map(slot).map(|slot| slot.map_or(CHANGED, |slot| slot - first));
+        Earlier { groups: self.tree.groups_of(row), slots: slots.collect() }
+    }
+}
+
+/// What a leaf of a new tree stands for.
+#[derive(Clone, Copy)]
+pub(super) enum Leaf {
+    /// An emitter, or the first of a light that is placed.
+    Emitter(u32),
+    /// The tree of what stands still.
+    Below(TreeRow),
+}
+
+fn kind_of(tree: &LightTree<&[u8]>, row: u32) -> Option<TreeKind> {
+    tree.trees().get(row as usize).and_then(TreeKind::of)
+}
+
+/// For each light the first emitter of the one in the tree that has the same class and content, each
+/// once; `None` if there is none.
+fn same_lights(tree: &LightTree<&[u8]>, lights: &[LightSummary]) -> Vec<Option<u32>> {
+    let rows = tree.lights();
+    let mut found = vec![None; lights.len()];
+    // Both stand in the order of class and path, and most have a partner where the other list is.
+    let (mut gone, mut come) = (Vec::new(), Vec::new());
+    let (mut old, mut new) = (0, 0);
+    while let (Some(row), Some(light)) = (rows.get(old), lights.get(new)) {
+        if (row.class, row.fingerprint) == (light.class, light.fingerprint) {
+            found[new] = Some(row.first_emitter);
+            (old, new) = (old + 1, new + 1);
+            continue;
+        }
+        let place = (row.class, tree.light_path(row)).cmp(&(light.class, &light.path));
+        if place.is_le() {
+            gone.push(old);
+            old += 1;
+        }
+        if place.is_ge() {
+            come.push(new);
+            new += 1;
+        }
+    }
+    gone.extend(old..rows.len());
+    come.extend(new..lights.len());
+    // Of the rest, those with the same content.
+    let content = |row: &LightRow| (row.class, row.fingerprint);
+    let content_of_new = |light: &LightSummary| (light.class, light.fingerprint);
+    gone.sort_by_key(|&old| content(&rows[old]));
+    come.sort_by_key(|&new| content_of_new(&lights[new]));
+    let mut gone = gone.into_iter().peekable();
+    for new in come {
+        let wanted = content_of_new(&lights[new]);
+        while gone.next_if(|&old| content(&rows[old]) < wanted).is_some() {}
+        if let Some(old) = gone.next_if(|&old| content(&rows[old]) == wanted) {
+            found[new] = Some(rows[old].first_emitter);
+        }
+    }
+    found
+}

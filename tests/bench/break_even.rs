@@ -1,0 +1,78 @@
+//! What a tree file costs and saves, from a thousand emitters to a million: a table in Markdown.
+//!
+//! `cargo bench --bench break_even`
+
+mod lights;
+
+use candelabra::emitter::Emitters;
+use candelabra::pipeline::{self, BuildOptions, Survey};
+use candelabra::scene::Scene;
+use candelabra::store::write_atomically;
+use std::hint::black_box;
+use std::io::Write;
+use std::time::Instant;
+
+/// The median of so many.
+const REPETITIONS: usize = 7;
+
+/// Seconds that something takes.
+fn seconds<T>(mut work: impl FnMut() -> T) -> f64 {
+    let mut taken: Vec<f64> = (0..REPETITIONS)
+        .map(|_| {
+            let started = Instant::now();
+            black_box(work());
+            started.elapsed().as_secs_f64()
+        })
+        .collect();
+    taken.sort_by(f64::total_cmp);
+    taken[REPETITIONS / 2]
+}
+
+fn milliseconds(seconds: f64) -> String {
+    let digits = if seconds < 0.1 { 2 } else { 0 };
+    format!("{:.digits$} ms", 1e3 * seconds)
+}
+
+fn survey(scene: &Scene) -> Survey {
+    pipeline::survey(scene, &Emitters::collect(scene), &[1]).expect("lights of ordinary size")
+}
+
+/// One line of the table: point lights, each a prim of its own.
+fn row(folder: &std::path::Path, count: u32) -> String {
+    let options = BuildOptions::default();
+    let mut scene = lights::points(count);
+    let before = survey(&scene);
+    let surveying = seconds(|| survey(&scene));
+    let building = seconds(|| pipeline::build_tree(&before, &options));
+    let bytes = pipeline::build_tree(&before, &options);
+    let path = folder.join("points.ltree");
+    let writing =
+        seconds(|| write_atomically(&path, |file| file.write_all(bytes.as_ref())).unwrap());
+    let opening = seconds(|| pipeline::open_tree(&path, true).unwrap());
+
+    lights::change_one(&mut scene);
+    let after = survey(&scene);
+    let verifying = seconds(|| pipeline::open_base(&path).unwrap());
+    let base = pipeline::open_base(&path).unwrap();
+    let rebuilding = seconds(|| pipeline::rebuild_tree(&after, &options, &base));
+    let rebuilt = pipeline::rebuild_tree(&after, &options, &base);
+    let full = pipeline::build_tree(&after, &options);
+    assert!(full.as_ref() == rebuilt.bytes.as_ref(), "the same bytes");
+
+    let pays = ((building + writing) / (building - opening)).ceil().max(1.0);
+    let share = 100.0 * (verifying + rebuilding) / building;
+    let cells = [surveying, building, writing, opening].map(milliseconds).join(" | ");
+    let [verifying, rebuilding] = [verifying, rebuilding].map(milliseconds);
+    format!("| {count} | {cells} | {pays:.0} | {verifying} + {rebuilding} | {share:.0} % |")
+}
+
+fn main() {
+    let folder = tempfile::tempdir().expect("a folder for the file");
+    println!(
+        "\n| emitters | survey | build | write | open and verify | pays with process | one light \
+         changed: verify the base + rebuild | of a build |\n|---|---|---|---|---|---|---|---|"
+    );
+    for count in [1_000, 10_000, 100_000, 1_000_000] {
+        println!("{}", row(folder.path(), count));
+    }
+}
