@@ -53,5 +53,6 @@ pub use segment::Segment;
 pub use splitting::{SplitTest, Splitting};
 pub use tree::{LightTree, NoSuchFrame};
 pub use variance::Moments;
+pub use verify::rules::RULES;
 pub use viewer::{DistanceOnly, Glossy, Receiver, Viewer};
 pub use writer::{LightSummary, LightTreeWriter};
