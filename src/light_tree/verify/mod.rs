@@ -11,6 +11,7 @@ use super::group::WIDTH;
 use super::node::{Link, MOST};
 use super::records::TreeKind;
 use super::tree::LightTree;
+use crate::math::Similarity;
 use crate::store::{Record, Rule, StoreError, Violation};
 use groups::verify_groups;
 
@@ -82,6 +83,10 @@ impl<D: AsRef<[u8]> + Sync> LightTree<D> {
             check(instance.to_local.is_sound(), rules::INSTANCE_KEEPS_SHAPES, row)?;
             let is_spare = instance.reserved == [0; 2] || self.is_of_later_version();
             check(is_spare, rules::INSTANCE_SPARE_IS_ZERO, row)?;
+            let is_in_place =
+                instance.to_local == Similarity::IDENTITY && instance.first_emitter == 0;
+            let is_still = kind == Some(TreeKind::Still);
+            check(is_in_place || !is_still, rules::STILL_IS_IN_PLACE, row)?;
         }
         Ok(())
     }

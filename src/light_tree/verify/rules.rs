@@ -50,6 +50,7 @@ rules! {
     INSTANCE_IS_OF_A_TREE = "its tree is there, and of kind 0 or 1";
     INSTANCE_KEEPS_SHAPES = "its transform is finite, and its axes are of one length and at right angles, to 1e-4";
     INSTANCE_SPARE_IS_ZERO = "its spare bytes are 0";
+    STILL_IS_IN_PLACE = "if its tree is of kind 1, its transform is the identity and its first emitter 0";
 }
 
 rules! {
