@@ -7,11 +7,12 @@
 //! cargo test --test format bless -- --ignored
 //! ```
 //!
-//! After that it stays as it is: another version gets a file of its own beside it.
+//! After that it stays as it is, and another version gets a file of its own beside it. Where estimates
+//! change, and probabilities with them, `record` in the place of `bless` writes only what is recorded.
 
 use crate::page::{Report, report};
 use candelabra::emitter::Emitters;
-use candelabra::light_tree::{FrameTree, LightTree, Receiver};
+use candelabra::light_tree::{FrameTree, Pick, Receiver};
 use candelabra::pipeline::{self, BuildOptions, OpenedTree};
 use candelabra::store::AlignedBytes;
 use glam::Vec3;
@@ -78,7 +79,7 @@ fn samples(tree: &OpenedTree) -> Vec<Sample> {
 fn picks_of_forced<'a>(
     sampled: &'a FrameTree,
     receiver: &'a Receiver,
-) -> impl Iterator<Item = Option<candelabra::light_tree::Pick>> + 'a {
+) -> impl Iterator<Item = Option<Pick>> + 'a {
     (0..sampled.forced_count()).map(|light| sampled.sample_forced(light, receiver, 0.5))
 }
 
@@ -127,9 +128,13 @@ fn todays_build_gives_the_golden_bytes() {
 #[ignore = "writes the golden file anew"]
 fn bless() {
     fs::write(path("golden.ltree"), built()).unwrap();
+    record();
+}
+
+#[test]
+#[ignore = "writes anew what is recorded of the golden file"]
+fn record() {
     let tree = golden();
     let recorded = Recorded { content: report(&tree), samples: samples(&tree) };
-    let text = serde_json::to_string_pretty(&recorded).unwrap();
-    fs::write(path("golden.json"), text + "\n").unwrap();
-    assert_eq!(LightTree::open(built()).unwrap().fingerprint(), tree.fingerprint());
+    fs::write(path("golden.json"), serde_json::to_string(&recorded).unwrap() + "\n").unwrap();
 }

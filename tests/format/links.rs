@@ -11,6 +11,9 @@ use glam::Vec3;
 
 const GROUP: usize = 256;
 const LINK: usize = 224;
+/// What makes a link one to an emitter, and one to an instance.
+const EMITTER: u32 = 1 << 31;
+const INSTANCE: u32 = 3 << 30;
 
 fn point(energy: f32) -> LightBounds {
     LightBounds { aabb: Aabb::around([Vec3::ONE]), cone: Cone::ALL, energy, range_m: f32::INFINITY }
@@ -40,7 +43,7 @@ fn chain(count: usize, leads: std::ops::Range<usize>) -> Parts {
     for number in 0..count {
         for lane in 0..8 {
             let on = leads.contains(&lane) && number + 1 < count;
-            let link = if on { 1 } else { 1 << 31 | (number * 8 + lane) as u32 % 64 };
+            let link = if on { 1 } else { EMITTER | ((number * 8 + lane) as u32 % 64) };
             let at = GROUP * number + LINK + 4 * lane;
             groups[at..at + 4].copy_from_slice(&link.to_le_bytes());
         }
@@ -97,8 +100,8 @@ fn a_sound_tree_of_any_depth_is_walked() {
             true => (0.5 * total(number), 0.5 * total(number)),
             false => (f32::from_bits(1), total(number)),
         };
-        copy_lane(0, here, 1 << 31 | number);
-        copy_lane(1, rest, if is_last { 1 << 31 | DEPTH } else { 1 });
+        copy_lane(0, here, EMITTER | number);
+        copy_lane(1, rest, if is_last { EMITTER | DEPTH } else { 1 });
         groups.extend(own);
     }
     *parts.section("GRUP") = groups;
@@ -129,7 +132,7 @@ fn trees_that_place_each_other_are_not_walked_in_circles() {
         probe(parts.file().as_ref());
         let groups = parts.section("GRUP").len() / GROUP;
         for link in (0..groups * 8).map(|lane| GROUP * (lane / 8) + LINK + 4 * (lane % 8)) {
-            parts.set("GRUP", link, 3 << 30 | link as u32 % rows as u32);
+            parts.set("GRUP", link, INSTANCE | (link as u32 % rows as u32));
         }
         probe(parts.file().as_ref());
     }
