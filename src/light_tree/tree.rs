@@ -38,6 +38,7 @@ impl<D: AsRef<[u8]>> LightTree<D> {
         ) -> Result<Range<usize>, StoreError> {
             container.find::<T>(id)?.ok_or(StoreError::Missing(id))
         }
+        container.find::<u8>(records::META)?;
         Ok(LightTree {
             trees: required::<TreeRow>(&container, records::TREES)?,
             groups: required::<Group>(&container, records::GROUPS)?,

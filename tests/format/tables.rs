@@ -94,6 +94,9 @@ fn a_table_that_lies_is_refused_by_the_rule() {
     for size in [1, 48, 255, u32::MAX] {
         assert_eq!(rule(with_row("GRUP", element.clone(), size.into())), "TABL 8");
     }
+    for name in ["META", "TREE", "INST", "FRAM", "FORC", "LGHT", "PATH"] {
+        assert_eq!(rule(with_row(name, element.clone(), 7)), "TABL 8", "{name}");
+    }
     assert_eq!(rule(with_row("GRUP", element, 0)), "TABL 4");
     // Names.
     assert_eq!(rule(with_row("GRUP", 0..4, u32::from_le_bytes(*b"TREE").into())), "TABL 5");
@@ -141,6 +144,21 @@ fn later_files_are_read_as_far_as_they_can_be() {
     // What is there if there is something to say; what is always there.
     assert_eq!(with(&|parts| parts.sections.retain(|s| &s.name != b"META")), Ok(()));
     assert_eq!(with(&|parts| parts.sections.retain(|s| &s.name != b"PATH")), refused("TABL 7"));
+}
+
+/// Each section in turn is empty, or not there at all, while others speak of it.
+#[test]
+fn sections_that_are_missed_are_missed() {
+    let whole = Parts::of(&golden_bytes());
+    for section in whole.sections.iter().filter(|section| &section.name != b"META") {
+        let mut parts = whole.clone();
+        parts.section(std::str::from_utf8(&section.name).unwrap()).clear();
+        probe(parts.file().as_ref());
+        assert!(verify(parts.file().as_ref()).is_err(), "{:?} is empty", section.name);
+        parts.sections.retain(|other| other.name != section.name);
+        probe(parts.file().as_ref());
+        assert!(verify(parts.file().as_ref()).is_err(), "{:?} is absent", section.name);
+    }
 }
 
 /// A scene without lights.
