@@ -31,12 +31,9 @@ impl<D: AsRef<[u8]>> LightTree<D> {
             Some(TreeKind::Shared) => kinds.next().is_none(),
             Some(TreeKind::Still) => kinds.all(|kind| kind == Some(TreeKind::Shared)),
             Some(TreeKind::Frame) => {
-                let not_shared = kinds.filter(|kind| *kind != Some(TreeKind::Shared));
-                let mut not_shared = not_shared.take(2);
-                matches!(
-                    (not_shared.next(), not_shared.next()),
-                    (None | Some(Some(TreeKind::Still)), None)
-                )
+                let others: Vec<_> =
+                    kinds.filter(|kind| *kind != Some(TreeKind::Shared)).take(2).collect();
+                matches!(others[..], [] | [Some(TreeKind::Still)])
             }
             None => false,
         }
