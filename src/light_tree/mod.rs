@@ -58,5 +58,6 @@ pub use segment::Segment;
 pub use splitting::{SplitTest, Splitting};
 pub use tree::{LightTree, NoSuchFrame};
 pub use variance::Moments;
+pub use verify::rules::RULES;
 pub use viewer::{DistanceOnly, Receiver, Viewer};
 pub use writer::{LightSummary, LightTreeWriter};

@@ -5,9 +5,11 @@
 //! safe side: boxes and cones only ever grow. The layout is in the [format](crate::store).
 
 use super::importance::{Cluster, importance};
+use super::verify::rules;
 use super::viewer::Viewer;
 use crate::bounds::{Aabb, Cone, LightBounds};
 use crate::math::angle::between;
+use crate::store::Rule;
 use bytemuck::{Pod, Zeroable};
 use glam::{DVec3, Vec2, Vec3};
 use std::sync::LazyLock;
@@ -164,14 +166,14 @@ impl Node {
         }
     }
 
-    /// What a node must be whatever its neighbours: the first rule it breaks.
-    pub(super) fn broken_rule(&self) -> Option<&'static str> {
+    /// The first rule that a node breaks whatever its neighbours.
+    pub(super) fn broken_rule(&self) -> Option<Rule> {
         if !self.center().is_finite() || !self.half_extent().is_finite() {
-            Some("its box is not finite")
+            Some(rules::BOX_IS_FINITE)
         } else if !(self.energy.is_finite() && self.energy > 0.0) {
-            Some("its energy is not a positive number")
+            Some(rules::ENERGY_IS_POSITIVE)
         } else if self.axis.contains(&i16::MIN) {
-            Some("its axis is out of range")
+            Some(rules::AXIS_IS_IN_RANGE)
         } else {
             None
         }
@@ -192,20 +194,20 @@ impl Node {
 const ANGLE_TOLERANCE: f64 = 5e-6;
 
 impl Node {
-    /// What of a child sticks out of this node, if anything does.
-    pub(super) fn uncontained(&self, child: &Node) -> Option<&'static str> {
+    /// The rule that is broken where something of a child sticks out of this node.
+    pub(super) fn uncontained(&self, child: &Node) -> Option<Rule> {
         let apart = (self.center().as_dvec3() - child.center().as_dvec3()).abs();
         let reach = apart + child.half_extent().as_dvec3();
         if reach.cmpgt(self.half_extent().as_dvec3()).any() {
-            return Some("a child's box is not inside its parent's");
+            return Some(rules::BOX_IS_IN_PARENT);
         }
         if child.theta_e > self.theta_e
             || (is_two_sided(child.theta_o) && !is_two_sided(self.theta_o))
         {
-            return Some("a child shines where its parent does not");
+            return Some(rules::EMISSION_IS_IN_PARENT);
         }
         if self.range != 0 && !(1..=self.range).contains(&child.range) {
-            return Some("a child reaches farther than its parent");
+            return Some(rules::RANGE_IS_IN_PARENT);
         }
         let code = |node: &Node| node.theta_o & !TWO_SIDED_BIT;
         let everywhere = code(self) == !TWO_SIDED_BIT;
@@ -222,7 +224,7 @@ impl Node {
         let cos_needed = cos_d * cos_c - sin(cos_d) * sin(cos_c);
         let least = cos_p - ANGLE_TOLERANCE * (sin(cos_p) + ANGLE_TOLERANCE);
         let beyond = cos_d < -cos_c;
-        (beyond || cos_needed < least).then_some("a child's cone is not inside its parent's")
+        (beyond || cos_needed < least).then_some(rules::CONE_IS_IN_PARENT)
     }
 }
 

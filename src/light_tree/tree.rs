@@ -2,15 +2,16 @@
 
 use super::group::Group;
 use super::records::{self, FrameRow, InstanceRow, LightRow, NO_TREE, TreeKind, TreeRow};
-use crate::store::{Container, Section, SectionId, StoreError};
+use crate::store::{self, Container, Section, SectionId, StoreError};
 use bytemuck::Pod;
 use std::ops::Range;
+use std::sync::OnceLock;
 
 /// The light trees of a shot, viewed in the bytes of their file.
 ///
 /// [`open`](LightTree::open) looks at the header alone; [`verify`](LightTree::verify) proves the
 /// rest. Sampling an unverified tree may give wrong numbers, but it ends, stays inside the bytes and
-/// does not panic.
+/// does not panic; nothing shines in one whose links do not form trees.
 pub struct LightTree<D> {
     container: Container<D>,
     trees: Range<usize>,
@@ -20,6 +21,8 @@ pub struct LightTree<D> {
     forced: Option<Range<usize>>,
     lights: Range<usize>,
     paths: Range<usize>,
+    /// Whether walks end soon, once that is known.
+    walkable: OnceLock<bool>,
 }
 
 impl<D: AsRef<[u8]>> LightTree<D> {
@@ -35,6 +38,7 @@ impl<D: AsRef<[u8]>> LightTree<D> {
         ) -> Result<Range<usize>, StoreError> {
             container.find::<T>(id)?.ok_or(StoreError::Missing(id))
         }
+        container.find::<u8>(records::META)?;
         Ok(LightTree {
             trees: required::<TreeRow>(&container, records::TREES)?,
             groups: required::<Group>(&container, records::GROUPS)?,
@@ -43,6 +47,7 @@ impl<D: AsRef<[u8]>> LightTree<D> {
             forced: container.find::<u32>(records::FORCED)?,
             lights: required::<LightRow>(&container, records::LIGHTS)?,
             paths: required::<u8>(&container, records::PATHS)?,
+            walkable: OnceLock::new(),
             container,
         })
     }
@@ -135,6 +140,17 @@ impl<D: AsRef<[u8]>> LightTree<D> {
         self.container.bytes().len()
     }
 
+    /// Whether it was written in a later version than this program's, in which spare bytes may say
+    /// something.
+    pub(super) fn is_of_later_version(&self) -> bool {
+        self.container.minor_version() > store::VERSION.1
+    }
+
+    /// Notes what has been proved: that walks end.
+    pub(super) fn note_walkable(&self) {
+        self.walkable.get_or_init(|| true);
+    }
+
     /// Compares all checksums.
     pub(super) fn verify_checksums(&self) -> Result<(), StoreError> {
         self.container.verify_checksums()
@@ -146,6 +162,9 @@ impl<D: AsRef<[u8]>> LightTree<D> {
     /// # Errors
     /// [`NoSuchFrame`] if lights change and the file was built without this frame.
     pub(super) fn roots_at(&self, frame: i32) -> Result<(Option<u32>, &[u32]), NoSuchFrame> {
+        if !*self.walkable.get_or_init(|| self.is_walkable()) {
+            return Ok((None, &[]));
+        }
         let forced = self.forced();
         if self.frames.is_none() {
             let still = |row: &TreeRow| TreeKind::of(row) == Some(TreeKind::Still);

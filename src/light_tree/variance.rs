@@ -10,6 +10,7 @@
 
 use super::cut::{Entry, Picked, Scratch};
 use super::group::WIDTH;
+use super::node::Link;
 use super::sampling::{FrameTree, Next, Place, Weights};
 use super::splitting::{Splitting, comb};
 use super::viewer::Viewer;
@@ -74,30 +75,66 @@ impl FrameTree<'_> {
     }
 
     /// Mean and variance of what one descent from a place finds, over its probability; `expected` is
-    /// how many descents there are.
+    /// how many descents there are. Levels are kept in a list: a tree may be deeper than the stack.
     fn below<V: Viewer>(
         &self,
         place: Place<V>,
         expected: f64,
         contribution: &impl Fn(Picked, f64) -> f64,
     ) -> (f64, f64) {
-        let nothing = (0.0, 0.0);
-        let Some(group) = self.group(&place) else { return nothing };
-        let Some(weights) = Weights::of(group, &place.viewer) else { return nothing };
-        let (mut mean, mut second) = nothing;
-        for lane in (0..WIDTH).filter(|&lane| weights.of_lane[lane] > 0.0) {
-            let share = weights.share(lane);
-            let (own, variance) = match self.follow(&place, group.link(lane)) {
-                None => nothing,
-                Some(Next::Group(place)) => self.below(place, expected * share, contribution),
-                Some(Next::Emitter(emitter)) => {
-                    (contribution(Picked::Emitter(emitter), expected * share), 0.0)
+        let mut levels: Vec<Level<V>> = self.level(place, expected).into_iter().collect();
+        let mut found = (0.0, 0.0);
+        while let Some(level) = levels.last_mut() {
+            let alive = |lane: &usize| level.weights.of_lane[*lane] > 0.0;
+            let Some(lane) = (level.next..WIDTH).find(alive) else {
+                let Level { mean, second, .. } = *level;
+                found = (mean, (second - mean * mean).max(0.0));
+                levels.pop();
+                if let Some(above) = levels.last_mut() {
+                    above.add(above.next - 1, found);
                 }
+                continue;
             };
-            mean += own;
-            second += (variance + own * own) / share;
+            level.next = lane + 1;
+            let expected = level.expected * level.weights.share(lane);
+            match self.follow(&level.place, level.links[lane]) {
+                None => {}
+                Some(Next::Group(place)) => levels.extend(self.level(place, expected)),
+                Some(Next::Emitter(emitter)) => {
+                    level.add(lane, (contribution(Picked::Emitter(emitter), expected), 0.0));
+                }
+            }
         }
-        (mean, (second - mean * mean).max(0.0))
+        found
+    }
+
+    fn level<V: Viewer>(&self, place: Place<V>, expected: f64) -> Option<Level<V>> {
+        let group = self.group(&place)?;
+        let weights = Weights::of(group, &place.viewer)?;
+        let links = std::array::from_fn(|lane| group.link(lane));
+        Some(Level { place, weights, links, expected, next: 0, mean: 0.0, second: 0.0 })
+    }
+}
+
+/// A group on the way of a walk over all that a descent may find.
+struct Level<V> {
+    place: Place<V>,
+    weights: Weights,
+    links: [Link; WIDTH],
+    /// How many descents come here.
+    expected: f64,
+    /// The lane that is looked at next.
+    next: usize,
+    /// Mean and second moment of what its lanes before that give.
+    mean: f64,
+    second: f64,
+}
+
+impl<V> Level<V> {
+    /// Adds what a lane gives, by its mean and variance.
+    fn add(&mut self, lane: usize, (mean, variance): (f64, f64)) {
+        self.mean += mean;
+        self.second += (variance + mean * mean) / self.weights.share(lane);
     }
 }
 

@@ -6,7 +6,7 @@ use super::{Survey, frames_of, survey};
 use crate::emitter::{Emitters, LightOverflow};
 use crate::light_tree::{ALGORITHM_VERSION, LightSummary, LightTree};
 use crate::scene::Scene;
-use crate::store::{self, Mmap, StoreError};
+use crate::store::{self, Mmap, SectionId, StoreError};
 use std::collections::BTreeMap;
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -149,7 +149,7 @@ pub fn check_fresh<D: AsRef<[u8]>>(
     if told.eq(known.map(|(light, summary)| (light.first, light.count, summary.class))) {
         return Ok(());
     }
-    let cause = StoreError::Checksum { part: "the list of lights".into() };
+    let cause = StoreError::Checksum { section: Some(SectionId(*b"LGHT")) };
     Err(TreeError::Broken { path: path.into(), cause })
 }
 

@@ -4,6 +4,11 @@
 //! and renamed over its name. Whoever looks at the name sees the old file or the new one, never a
 //! part of one, even if the machine stops in between; a failed write leaves the old file alone
 //! and no temporary one behind.
+//!
+//! Of two writers of one name the last to finish wins. A writer that is killed (`kill -9`, a machine that
+//! stops) cannot clean up: its temporary file, `.candelabra-*.part` in the output's folder, stays. Nothing
+//! reads it and no later writer takes its name; who wants the space back may remove those that are older
+//! than any job that runs.
 
 use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
@@ -12,13 +17,22 @@ use tempfile::Builder;
 
 /// Writes a file through `write`, all or nothing. Parent folders are created.
 ///
-/// Errors name the path, and keep the kind of what the system or `write` reported.
+/// Errors name the path and, where the disk is full, the remedy; they keep the kind of what the system or
+/// `write` reported.
 pub fn write_atomically(
     path: &Path,
     write: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>,
 ) -> io::Result<()> {
-    replace(path, write)
-        .map_err(|error| io::Error::new(error.kind(), format!("{}: {error}", path.display())))
+    replace(path, write).map_err(|error| {
+        use io::ErrorKind::{FileTooLarge, QuotaExceeded, StorageFull};
+        let remedy = match error.kind() {
+            StorageFull | QuotaExceeded | FileTooLarge => {
+                "; the old file, if any, is as it was: free some space, or choose another output"
+            }
+            _ => "",
+        };
+        io::Error::new(error.kind(), format!("{}: {error}{remedy}", path.display()))
+    })
 }
 
 fn replace(

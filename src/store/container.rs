@@ -1,6 +1,6 @@
 //! The container: a header, a table of sections, and the sections. See the [room's page](super).
 
-use super::{ALIGNMENT, AlignedBytes, StoreError};
+use super::{ALIGNMENT, AlignedBytes, Record, Rule, StoreError, Violation, error};
 use bytemuck::{Pod, Zeroable};
 use std::fmt;
 use std::ops::Range;
@@ -127,6 +127,7 @@ pub struct Container<D> {
     data: D,
     sections: Vec<Section>,
     fingerprint: [u8; 32],
+    minor: u16,
 }
 
 impl<D: AsRef<[u8]>> Container<D> {
@@ -151,7 +152,7 @@ impl<D: AsRef<[u8]>> Container<D> {
         hasher.update(&[0; 4]);
         hasher.update(&bytes[CHECKSUM_FIELD.end..table_end]);
         if hasher.finalize() != header.checksum {
-            return Err(StoreError::Checksum { part: "the header".into() });
+            return Err(StoreError::Checksum { section: None });
         }
         let sections: Vec<Section> = bytes[HEADER_SIZE..table_end]
             .chunks_exact(ROW_SIZE)
@@ -161,7 +162,7 @@ impl<D: AsRef<[u8]>> Container<D> {
         if let Some(alien) = sections.iter().find(|s| s.required != 0 && !known.contains(&s.id)) {
             return Err(StoreError::Unknown(alien.id));
         }
-        Ok(Container { fingerprint: header.fingerprint, sections, data })
+        Ok(Container { fingerprint: header.fingerprint, minor: header.minor, sections, data })
     }
 
     /// Compares every section with its checksum, and the gaps between them with zero.
@@ -173,9 +174,11 @@ impl<D: AsRef<[u8]>> Container<D> {
         let mut end = HEADER_SIZE + self.sections.len() * ROW_SIZE;
         for section in &self.sections {
             let range = section.offset as usize..(section.offset + section.length) as usize;
-            let gap_is_zero = bytes[end..range.start].iter().all(|&byte| byte == 0);
-            if !gap_is_zero || crc32fast::hash(&bytes[range.clone()]) != section.checksum {
-                return Err(StoreError::Checksum { part: format!("section {}", section.id) });
+            if bytes[end..range.start].iter().any(|&byte| byte != 0) {
+                return Err(broken(error::GAPS_ARE_ZERO, section.id));
+            }
+            if crc32fast::hash(&bytes[range.clone()]) != section.checksum {
+                return Err(StoreError::Checksum { section: Some(section.id) });
             }
             end = range.end;
         }
@@ -187,6 +190,12 @@ impl<D: AsRef<[u8]>> Container<D> {
         self.fingerprint
     }
 
+    /// The minor version that it was written in. A later one than [`VERSION`]'s may say more, in sections
+    /// and bytes that this version does not know.
+    pub fn minor_version(&self) -> u16 {
+        self.minor
+    }
+
     /// The section table.
     pub fn sections(&self) -> &[Section] {
         &self.sections
@@ -195,7 +204,7 @@ impl<D: AsRef<[u8]>> Container<D> {
     /// Where a section's elements are, if it is there; checked to be whole elements of `T`.
     ///
     /// # Errors
-    /// [`StoreError::Section`] if the element size is another.
+    /// [`StoreError::Broken`] if the element size is another.
     pub fn find<T: Pod>(&self, id: SectionId) -> Result<Option<Range<usize>>, StoreError> {
         let Some(section) = self.sections.iter().find(|s| s.id == id) else {
             return Ok(None);
@@ -203,8 +212,7 @@ impl<D: AsRef<[u8]>> Container<D> {
         let size = size_of::<T>();
         if section.element_size as usize != size || !(section.length as usize).is_multiple_of(size)
         {
-            let rule = format!("elements must be {size} bytes each");
-            return Err(StoreError::Section { section: id, rule });
+            return Err(broken(error::ELEMENTS_ARE_WHOLE, id));
         }
         Ok(Some(section.offset as usize..(section.offset + section.length) as usize))
     }
@@ -252,28 +260,32 @@ fn read_header(bytes: &[u8]) -> Result<Header, StoreError> {
     Ok(header)
 }
 
+fn broken(rule: Rule, section: SectionId) -> StoreError {
+    StoreError::Broken(Violation { rule, record: Record::Section(section) })
+}
+
 /// Sections lie in order, aligned, without overlap, inside the file.
 fn check_layout(sections: &[Section], table_end: u64, file_length: u64) -> Result<(), StoreError> {
     let mut end = table_end;
     for (i, section) in sections.iter().enumerate() {
-        let fail = |rule: &str| Err(StoreError::Section { section: section.id, rule: rule.into() });
+        let fail = |rule| Err(broken(rule, section.id));
         let Some(section_end) = section.offset.checked_add(section.length) else {
-            return fail("it ends beyond every file");
+            return fail(error::SECTION_IS_INSIDE);
         };
         if section.offset % ALIGNMENT as u64 != 0 {
-            return fail("its offset is not a multiple of 64");
+            return fail(error::OFFSET_IS_ALIGNED);
         }
         if section.offset < end || section.offset - end >= ALIGNMENT as u64 {
-            return fail("it does not follow the one before it");
+            return fail(error::SECTIONS_FOLLOW);
         }
         if section_end > file_length {
-            return fail("it ends beyond the file");
+            return fail(error::SECTION_IS_INSIDE);
         }
         if section.element_size == 0 {
-            return fail("its elements have no size");
+            return fail(error::ELEMENTS_HAVE_SIZE);
         }
         if sections[..i].iter().any(|earlier| earlier.id == section.id) {
-            return fail("it appears twice");
+            return fail(error::SECTION_IS_ONE);
         }
         end = section_end;
     }

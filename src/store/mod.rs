@@ -10,10 +10,13 @@ mod bytes;
 mod container;
 mod error;
 mod map;
+mod rule;
 
 pub use atomic::write_atomically;
 pub use bytes::{ALIGNMENT, AlignedBytes};
 pub use container::{Container, ContainerWriter, MAGIC, Section, SectionId, VERSION};
-pub use error::StoreError;
+pub use error::{RULES_OF_HEADER, RULES_OF_TABLE, StoreError};
 pub use map::map;
 pub use memmap2::Mmap;
+pub(crate) use rule::rules;
+pub use rule::{Record, Rule, Violation};

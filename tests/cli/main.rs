@@ -1,8 +1,10 @@
 //! The two programs, as a pipeline TD and a farm use them.
 
 mod build;
+mod disk;
 mod files;
 mod lights;
 mod render;
 mod resume;
 mod trees;
+mod verify;

@@ -1,10 +1,13 @@
 //! Files in, a scene index out.
 
+mod corpus;
 mod files;
 mod fog;
 mod gltf;
 mod malformed;
 mod obj;
+#[path = "../fuzz/probe/scene.rs"]
+mod probe;
 mod real;
 mod refused;
 mod shared;

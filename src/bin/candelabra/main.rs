@@ -5,6 +5,7 @@ mod inspect;
 mod measure;
 mod race;
 mod shot;
+mod verify;
 
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
@@ -27,17 +28,21 @@ enum Command {
     Measure(measure::Arguments),
     /// Render with several settings and compare their errors and times
     Race(race::Arguments),
+    /// Check that tree files keep every rule of the format, and name the first that is broken
+    Verify(verify::Arguments),
 }
 
 fn main() -> ExitCode {
+    let done = |()| ExitCode::SUCCESS;
     let outcome = match Arguments::parse().command {
-        Command::Build(arguments) => build::run(&arguments),
-        Command::Inspect(arguments) => inspect::run(&arguments),
-        Command::Measure(arguments) => measure::run(&arguments),
-        Command::Race(arguments) => race::run(&arguments),
+        Command::Build(arguments) => build::run(&arguments).map(done),
+        Command::Inspect(arguments) => inspect::run(&arguments).map(done),
+        Command::Measure(arguments) => measure::run(&arguments).map(done),
+        Command::Race(arguments) => race::run(&arguments).map(done),
+        Command::Verify(arguments) => verify::run(&arguments),
     };
     match outcome {
-        Ok(()) => ExitCode::SUCCESS,
+        Ok(code) => code,
         // A reader that has seen enough (`| head`) is no failure.
         Err(error) if is_closed_pipe(&error) => ExitCode::SUCCESS,
         Err(error) => {

@@ -87,7 +87,8 @@ fn read_library(folder: &Folder, file: &Path, notes: &mut Notes) -> Library {
         let name = file.to_str().ok_or("its name is not UTF-8")?;
         let file = folder.resolve(name, &object).map_err(Fault::into_problem)?;
         let bytes = folder.read(&file, &object).map_err(Fault::into_problem)?;
-        tobj::load_mtl_buf(&mut text::decode(&bytes)?.as_bytes()).map_err(|error| error.to_string())
+        let text = text::with_whole_colors(&text::decode(&bytes)?)?;
+        tobj::load_mtl_buf(&mut text.as_bytes()).map_err(|error| error.to_string())
     };
     read().unwrap_or_else(|problem| {
         notes.add(&*object, format!("{problem}; surfaces are drawn with the default material"));

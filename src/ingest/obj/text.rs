@@ -71,9 +71,38 @@ pub(super) fn without_polylines(text: &str) -> String {
     kept.join("\n")
 }
 
+/// The text of a material library in which colours have three numbers each, as `tobj` takes for granted:
+/// by the MTL specification one alone stands for all three.
+pub(super) fn with_whole_colors(text: &str) -> Result<String, String> {
+    let whole = |(i, line): (usize, &str)| {
+        let words: Vec<&str> = line.split_whitespace().collect();
+        match words[..] {
+            [name @ ("Ka" | "Kd" | "Ks" | "Ke"), grey] => {
+                Ok(format!("{name} {grey} {grey} {grey}"))
+            }
+            ["Ka" | "Kd" | "Ks" | "Ke"] | ["Ka" | "Kd" | "Ks" | "Ke", _, _] => {
+                Err(format!("line {}: a colour has one number or three", i + 1))
+            }
+            _ => Ok(line.to_string()),
+        }
+    };
+    let lines: Result<Vec<String>, String> = text.lines().enumerate().map(whole).collect();
+    Ok(lines?.join("\n"))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_colour_of_one_number_is_grey_and_of_two_is_none() {
+        let text = "newmtl a\n Ke 4\nKd 1 .5 0\n# Ks 1";
+        let whole = with_whole_colors(text).unwrap();
+        assert_eq!(whole, "newmtl a\nKe 4 4 4\nKd 1 .5 0\n# Ks 1");
+        for bad in ["Ke", "newmtl a\nKs 1 2"] {
+            assert!(with_whole_colors(bad).unwrap_err().contains("one number or three"), "{bad}");
+        }
+    }
 
     #[test]
     fn indices_are_looked_at_before_they_are_used() {

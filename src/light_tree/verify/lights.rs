@@ -1,0 +1,88 @@
+//! What `verify` checks of lights, and of the frames in which they shine.
+
+use super::{Checked, check, check_all, rules};
+use crate::light_tree::group::WIDTH;
+use crate::light_tree::node::MOST;
+use crate::light_tree::records::{FrameRow, LightRow, NO_TREE, TreeKind};
+use crate::light_tree::tree::LightTree;
+
+impl<D: AsRef<[u8]> + Sync> LightTree<D> {
+    /// The lights' rows.
+    pub(super) fn verify_lights(&self) -> Checked {
+        let mut next_emitter = 0_u64;
+        let mut before: Option<(u32, &str)> = None;
+        for (row, light) in self.lights().iter().enumerate() {
+            let follows = u64::from(light.first_emitter) == next_emitter;
+            check(follows, rules::EMITTERS_FOLLOW, row)?;
+            next_emitter += u64::from(light.emitter_count);
+            check(matches!(light.class, 0..=3 | 5 | 7), rules::CLASS_IS_KNOWN, row)?;
+            let is_spare = light.reserved == [0; 2] || self.is_of_later_version();
+            check(is_spare, rules::LIGHT_SPARE_IS_ZERO, row)?;
+            let is_number = light.energy.is_finite() && light.energy >= 0.0;
+            check(is_number, rules::LIGHT_ENERGY_IS_A_NUMBER, row)?;
+            let now = (light.class, self.light_path(light));
+            check(!now.1.is_empty(), rules::PATH_IS_TEXT, row)?;
+            check(before.is_none_or(|before| before < now), rules::LIGHTS_ARE_IN_ORDER, row)?;
+            before = Some(now);
+        }
+        // More leaves than lanes are not to be looked for.
+        let own = u64::from(self.first_of_class(LightRow::PLACED));
+        let lanes = (self.groups().len() * WIDTH) as u64;
+        check_all(next_emitter < MOST as u64 && own <= lanes, rules::EMITTERS_ARE_NUMBERED)
+    }
+
+    /// First emitter and count of the lights of a class.
+    pub(super) fn lights_of_class(&self, class: u32) -> Vec<(u32, u32)> {
+        let lights = self.lights().iter().filter(|light| light.class == class);
+        lights.map(|light| (light.first_emitter, light.emitter_count)).collect()
+    }
+
+    /// The frames' rows, and the entries of forced lights that they, or the file, have.
+    pub(super) fn verify_frames(&self) -> Checked {
+        let kind_of = |row: u32| self.trees().get(row as usize).and_then(TreeKind::of);
+        let is = |kind| move |row: &_| TreeKind::of(row) == Some(kind);
+        let has_still = self.trees().iter().any(is(TreeKind::Still));
+        let changes = [LightRow::CHANGES, LightRow::CHANGES | LightRow::PLACED];
+        let any_changes = self.lights().iter().any(|light| changes.contains(&light.class));
+        let mut before = None;
+        let mut next_forced = 0_u64;
+        for (row, &FrameRow { frame, tree, first_forced, forced_count }) in
+            self.frames().iter().enumerate()
+        {
+            check(before < Some(frame), rules::FRAMES_ASCEND, row)?;
+            before = Some(frame);
+            // Where only forced lights change, frames share the tree of what stands still.
+            let is_right = match (any_changes, has_still) {
+                (true, _) => kind_of(tree) == Some(TreeKind::Frame),
+                (false, true) => kind_of(tree) == Some(TreeKind::Still),
+                (false, false) => tree == NO_TREE,
+            };
+            check(is_right, rules::FRAME_HAS_ITS_TREE, row)?;
+            let follows = u64::from(first_forced) == next_forced;
+            next_forced += u64::from(forced_count);
+            let is_there = next_forced <= self.forced().len() as u64;
+            check(follows && is_there, rules::FRAMES_USE_FORCED, row)?;
+            self.verify_forced(first_forced as usize..next_forced as usize)?;
+        }
+        if self.frames().is_empty() {
+            return self.verify_forced(0..self.forced().len());
+        }
+        check_all(next_forced == self.forced().len() as u64, rules::FRAMES_USE_FORCED)
+    }
+
+    /// A run of forced lights: all there are, in order.
+    fn verify_forced(&self, run: std::ops::Range<usize>) -> Checked {
+        let mut lights = self.lights().iter().filter(|light| light.is(LightRow::FORCED));
+        for entry in run.clone() {
+            let instance = self.instances().get(self.forced()[entry] as usize);
+            let placed = instance
+                .and_then(|instance| Some((instance, self.trees().get(instance.tree as usize)?)))
+                .filter(|(_, tree)| TreeKind::of(tree) == Some(TreeKind::Shared));
+            check(placed.is_some(), rules::FORCED_IS_A_TREE, entry)?;
+            let placed = placed.map(|(instance, tree)| (instance.first_emitter, tree.leaf_count));
+            let light = lights.next().map(|light| (light.first_emitter, light.emitter_count));
+            check(placed == light, rules::FORCED_ARE_ALL, entry)?;
+        }
+        check(lights.next().is_none(), rules::FORCED_ARE_ALL, run.end)
+    }
+}

@@ -1,0 +1,112 @@
+//! Proof that a file is what the format says: that traversal ends, stays inside, and never calls
+//! a lit point dark. Each check is one of the format's [rules].
+
+mod contents;
+mod groups;
+mod lights;
+pub(super) mod rules;
+mod walkable;
+
+use super::group::WIDTH;
+use super::node::{Link, MOST};
+use super::records::TreeKind;
+use super::tree::LightTree;
+use crate::math::Similarity;
+use crate::store::{Record, Rule, StoreError, Violation};
+use groups::verify_groups;
+
+type Checked<T = ()> = Result<T, Violation>;
+
+/// A rule that holds for a row, or does not.
+fn check(holds: bool, rule: Rule, row: usize) -> Checked {
+    if holds { Ok(()) } else { Err(Violation { rule, record: Record::Row(row as u32) }) }
+}
+
+/// A rule that holds for a section as a whole, or does not.
+fn check_all(holds: bool, rule: Rule) -> Checked {
+    if holds { Ok(()) } else { Err(Violation { rule, record: Record::All }) }
+}
+
+impl<D: AsRef<[u8]> + Sync> LightTree<D> {
+    /// Checks everything the [format](crate::store) promises, in time linear in the file.
+    ///
+    /// # Errors
+    /// The first rule that is broken, with its section and record.
+    pub fn verify(&self) -> Result<(), StoreError> {
+        self.verify_checksums()?;
+        self.verify_rules().map_err(StoreError::Broken)?;
+        self.note_walkable();
+        Ok(())
+    }
+
+    fn verify_rules(&self) -> Checked {
+        self.verify_lights()?;
+        self.verify_trees()?;
+        self.verify_instances()?;
+        let mut seen = Vec::new();
+        for (row, tree) in self.trees().iter().enumerate() {
+            verify_groups(tree, self.groups_of(tree))?;
+            self.verify_contents(row, tree, &mut seen)?;
+        }
+        self.verify_frames()
+    }
+
+    /// The trees' rows: in range, and each following the tree before it.
+    fn verify_trees(&self) -> Checked {
+        let all = self.groups().len() as u64;
+        check_all(self.groups().len() < MOST / WIDTH, rules::GROUPS_ARE_NUMBERED)?;
+        let mut groups = 0_u64;
+        let mut before = None;
+        for (row, tree) in self.trees().iter().enumerate() {
+            let kind = TreeKind::of(tree);
+            let has_some = tree.group_count > 0 && tree.leaf_count > 0;
+            check(kind.is_some() && has_some, rules::TREE_IS_OF_A_KIND, row)?;
+            let is_second_still = before == kind && kind == Some(TreeKind::Still);
+            check(before <= kind && !is_second_still, rules::TREES_ARE_IN_ORDER, row)?;
+            let follows = u64::from(tree.first_group) == groups;
+            groups += u64::from(tree.group_count);
+            check(follows && groups <= all, rules::TREES_USE_THE_GROUPS, row)?;
+            let root_is_sound =
+                tree.root.broken_rule().is_none() && tree.root.link() == Link::Nothing;
+            check(root_is_sound, rules::ROOT_IS_SOUND, row)?;
+            before = kind;
+        }
+        check_all(groups == all, rules::TREES_USE_THE_GROUPS)
+    }
+
+    /// Trees put somewhere.
+    fn verify_instances(&self) -> Checked {
+        for (row, instance) in self.instances().iter().enumerate() {
+            let kind = self.trees().get(instance.tree as usize).and_then(TreeKind::of);
+            let is_placeable = matches!(kind, Some(TreeKind::Shared | TreeKind::Still));
+            check(is_placeable, rules::INSTANCE_IS_OF_A_TREE, row)?;
+            check(instance.to_local.is_sound(), rules::INSTANCE_KEEPS_SHAPES, row)?;
+            let is_spare = instance.reserved == [0; 2] || self.is_of_later_version();
+            check(is_spare, rules::INSTANCE_SPARE_IS_ZERO, row)?;
+            let is_in_place =
+                instance.to_local == Similarity::IDENTITY && instance.first_emitter == 0;
+            let is_still = kind == Some(TreeKind::Still);
+            check(is_in_place || !is_still, rules::STILL_IS_IN_PLACE, row)?;
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    /// The page has every rule, by its number and in its words; and no other.
+    #[test]
+    fn the_page_has_the_rules() {
+        let page = include_str!("../../store/format.md");
+        let all = super::rules::RULES.concat();
+        let rows: Vec<String> =
+            all.iter().map(|rule| format!("| {rule} | {} |", rule.text)).collect();
+        let number = |line: &str| {
+            let (part, number) = line.strip_prefix("| ")?.split(" | ").next()?.split_once(' ')?;
+            all.iter().find(|rule| rule.part.to_string() == part)?;
+            number.parse::<u8>().ok()
+        };
+        let on_page: Vec<&str> = page.lines().filter(|line| number(line).is_some()).collect();
+        assert_eq!(on_page, rows);
+    }
+}

@@ -1,0 +1,41 @@
+//! Whether walks through trees that nobody verified end, and soon.
+
+use super::groups::parents_of;
+use crate::light_tree::group::{Group, WIDTH};
+use crate::light_tree::node::Link;
+use crate::light_tree::records::{TreeKind, TreeRow};
+use crate::light_tree::tree::LightTree;
+
+impl<D: AsRef<[u8]>> LightTree<D> {
+    /// Whether links form trees: every group is reached once, shared trees hold no others, and the tree of
+    /// a frame holds that of what stands still at most once.
+    ///
+    /// Links that merely lead onwards would end every walk. But where many lead to one group, and from
+    /// there again, there are more ways down than a walk over all of them ever finishes.
+    pub(in crate::light_tree) fn is_walkable(&self) -> bool {
+        self.trees().iter().all(|tree| {
+            let groups = self.groups_of(tree);
+            let is_whole = tree.group_count > 0 && groups.len() == tree.group_count as usize;
+            is_whole && parents_of(groups).is_ok() && self.holds_trees_once(tree, groups)
+        })
+    }
+
+    fn holds_trees_once(&self, tree: &TreeRow, groups: &[Group]) -> bool {
+        let links = groups.iter().flat_map(|group| (0..WIDTH).map(|lane| group.link(lane)));
+        let below = links.filter_map(|link| match link {
+            Link::Instance(row) => self.instances().get(row as usize),
+            _ => None,
+        });
+        let mut kinds = below.map(|row| self.trees().get(row.tree as usize).and_then(TreeKind::of));
+        match TreeKind::of(tree) {
+            Some(TreeKind::Shared) => kinds.next().is_none(),
+            Some(TreeKind::Still) => kinds.all(|kind| kind == Some(TreeKind::Shared)),
+            Some(TreeKind::Frame) => {
+                let others: Vec<_> =
+                    kinds.filter(|kind| *kind != Some(TreeKind::Shared)).take(2).collect();
+                matches!(others[..], [] | [Some(TreeKind::Still)])
+            }
+            None => false,
+        }
+    }
+}

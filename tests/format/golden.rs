@@ -1,0 +1,140 @@
+//! A file of version 1 that is read for ever, and what it says.
+//!
+//! `golden.ltree` is built from `golden.gltf`, a few lights of every class. While version 1 is not
+//! released, a change of the build makes it anew, with what is recorded of it:
+//!
+//! ```sh
+//! cargo test --test format bless -- --ignored
+//! ```
+//!
+//! After that it stays as it is, and another version gets a file of its own beside it. Where estimates
+//! change, and probabilities with them, `record` in the place of `bless` writes only what is recorded.
+
+use crate::page::{Report, report};
+use candelabra::emitter::Emitters;
+use candelabra::light_tree::{FrameTree, Pick, Receiver};
+use candelabra::pipeline::{self, BuildOptions, OpenedTree};
+use candelabra::store::AlignedBytes;
+use glam::Vec3;
+use serde::{Deserialize, Serialize};
+use std::fs;
+use std::path::{Path, PathBuf};
+
+pub fn path(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/format").join(name)
+}
+
+/// The file, opened and verified as the renderer does.
+pub fn golden() -> OpenedTree {
+    pipeline::open_tree(&path("golden.ltree"), true).unwrap()
+}
+
+/// The file as bytes that may be changed.
+pub fn golden_bytes() -> Vec<u8> {
+    fs::read(path("golden.ltree")).unwrap()
+}
+
+/// The scene, built today.
+fn built() -> AlignedBytes {
+    let scene = pipeline::load_scene(&path("golden.gltf")).unwrap();
+    let emitters = Emitters::collect(&scene);
+    let survey = pipeline::survey(&scene, &emitters, &pipeline::frames_of(&scene)).unwrap();
+    pipeline::build_tree(&survey, &BuildOptions { program: "golden".into() })
+}
+
+/// What was recorded of the file: its content, and what sampling it gave.
+#[derive(Serialize, Deserialize)]
+struct Recorded {
+    content: Report,
+    samples: Vec<Sample>,
+}
+
+#[derive(Debug, PartialEq, Serialize, Deserialize)]
+struct Sample {
+    frame: i32,
+    emitter: u32,
+    probability: f64,
+}
+
+/// A few picks in every frame, of forced lights too.
+fn samples(tree: &OpenedTree) -> Vec<Sample> {
+    let table = tree.leaf_table();
+    let mut samples = Vec::new();
+    for frame in 1..=3 {
+        let sampled = tree.at_frame(frame, &table).unwrap();
+        for (point, normal) in [(Vec3::ZERO, Vec3::Y), (Vec3::new(-3.0, 0.0, 2.0), Vec3::ZERO)] {
+            let receiver = Receiver { point, normal };
+            let picks = (0..4).map(|i| sampled.sample(&receiver, (f64::from(i) + 0.5) / 4.0));
+            let picks = picks.chain(picks_of_forced(&sampled, &receiver)).flatten();
+            samples.extend(picks.map(|pick| Sample {
+                frame,
+                emitter: pick.light.emitter().unwrap(),
+                probability: pick.probability,
+            }));
+        }
+    }
+    samples
+}
+
+fn picks_of_forced<'a>(
+    sampled: &'a FrameTree,
+    receiver: &'a Receiver,
+) -> impl Iterator<Item = Option<Pick>> + 'a {
+    (0..sampled.forced_count()).map(|light| sampled.sample_forced(light, receiver, 0.5))
+}
+
+fn recorded() -> Recorded {
+    serde_json::from_slice(&fs::read(path("golden.json")).unwrap()).unwrap()
+}
+
+#[test]
+fn the_golden_file_says_what_it_said() {
+    let (tree, recorded) = (golden(), recorded());
+    recorded.content.assert_is(&report(&tree));
+    let samples = samples(&tree);
+    assert_eq!(samples.len(), recorded.samples.len());
+    for (now, then) in samples.iter().zip(&recorded.samples) {
+        assert_eq!((now.frame, now.emitter), (then.frame, then.emitter));
+        let off = (now.probability / then.probability - 1.0).abs();
+        assert!(off < 1e-4, "{now:?}, then {then:?}");
+    }
+}
+
+/// It has a light of every class there is, and a group of every kind of link.
+#[test]
+fn the_golden_file_has_everything() {
+    let tree = golden();
+    let mut classes: Vec<u32> = tree.lights().iter().map(|light| light.class).collect();
+    classes.dedup();
+    assert_eq!(classes, [0, 1, 2, 3, 5, 7]);
+    let mut kinds: Vec<u32> = tree.trees().iter().map(|tree| tree.kind).collect();
+    kinds.dedup();
+    assert_eq!(kinds, [0, 1, 2]);
+    assert_eq!(tree.sections().len(), 8);
+    assert!(
+        tree.trees()
+            .iter()
+            .all(|tree| tree.kind == 2 || tree.group_count > 1 || tree.leaf_count == 1)
+    );
+}
+
+#[test]
+fn todays_build_gives_the_golden_bytes() {
+    let same = built().as_ref() == golden_bytes();
+    assert!(same, "the build has changed; see the head of this file for how to bless it");
+}
+
+#[test]
+#[ignore = "writes the golden file anew"]
+fn bless() {
+    fs::write(path("golden.ltree"), built()).unwrap();
+    record();
+}
+
+#[test]
+#[ignore = "writes anew what is recorded of the golden file"]
+fn record() {
+    let tree = golden();
+    let recorded = Recorded { content: report(&tree), samples: samples(&tree) };
+    fs::write(path("golden.json"), serde_json::to_string(&recorded).unwrap() + "\n").unwrap();
+}
