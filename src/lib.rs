@@ -58,9 +58,11 @@
 pub mod bounds;
 pub mod emitter;
 pub mod ingest;
+pub mod inspect;
 pub mod light_tree;
 pub mod math;
 pub mod measure;
+pub mod page;
 pub mod pipeline;
 pub mod render;
 pub mod scene;

@@ -63,7 +63,7 @@ impl Bin {
         if self.count == 0 {
             return 0.0;
         }
-        self.energy * area_measure(&self.aabb) * f64::from(self.orientation_measure())
+        self.energy * self.aabb.measure() * f64::from(self.orientation_measure())
     }
 
     /// [`Cone::measure`] of the estimated cone.
@@ -107,15 +107,6 @@ fn upwards(axis: Vec3) -> Vec3 {
     };
     axis * 1f32.copysign(largest)
 }
-
-/// Surface of a box plus a share of its squared diagonal: a measure that scales like an area and
-/// still tells a short line of points from a long one, and points on a line from a single point.
-fn area_measure(aabb: &Aabb) -> f64 {
-    let e = aabb.extent().as_dvec3();
-    2.0 * (e.x * e.y + e.y * e.z + e.z * e.x) + DIAGONAL_SHARE * e.length_squared()
-}
-
-const DIAGONAL_SHARE: f64 = 0.25;
 
 #[cfg(test)]
 mod tests {

@@ -1,0 +1,315 @@
+//! Marks in space, as an architect draws them: the plan, from above, and below it the elevation,
+//! from the front, in one scale and in line.
+
+use super::axes::ticks;
+use super::escape::Escaped;
+use super::shade::Shade;
+use super::{Ink, Part};
+use glam::{DVec3, Vec3};
+use std::fmt::{self, Display};
+
+/// A box in space, metres, Y up.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Cuboid {
+    /// Smallest corner.
+    pub min: Vec3,
+    /// Largest corner.
+    pub max: Vec3,
+}
+
+/// A spot in space.
+#[derive(Clone, Debug)]
+pub struct Mark {
+    /// Where, metres, Y up.
+    pub at: Vec3,
+    /// Its area is in proportion, down to a size that can still be seen. Not negative.
+    pub weight: f32,
+    /// Its colour, which [`Plan::kinds`] explains.
+    pub ink: Ink,
+    /// What is said of it when it is pointed at.
+    pub label: String,
+}
+
+/// Boxes that are shown together.
+#[derive(Clone, Debug)]
+pub struct Level {
+    /// What they are.
+    pub name: String,
+    /// They.
+    pub boxes: Vec<Cuboid>,
+}
+
+/// Plan and elevation of marks, with one of several levels of boxes.
+#[derive(Clone, Debug)]
+pub struct Plan {
+    /// What the colours mean.
+    pub kinds: Vec<(Ink, String)>,
+    /// The spots.
+    pub marks: Vec<Mark>,
+    /// The boxes; a slider leafs through them.
+    pub levels: Vec<Level>,
+    /// Which level is shown first.
+    pub shown: usize,
+    caption: String,
+    views: [View; 2],
+    shades: Option<[Shade; 2]>,
+}
+
+/// Sides of the picture, in units of the drawing: pixels, if there is room.
+const WIDTH: f64 = 960.0;
+const LEFT: f64 = 56.0;
+const RIGHT: f64 = 8.0;
+const ABOVE: f64 = 26.0;
+const BELOW: f64 = 22.0;
+/// At most so high.
+const HEIGHTS: [f64; 2] = [520.0, 300.0];
+const LEAST_HEIGHT: f64 = 60.0;
+/// Radius of the heaviest mark and of the lightest.
+const RADII: [f64; 2] = [11.0, 1.4];
+/// Side of a cell of the ground.
+const CELL: f64 = 2.0;
+
+/// One way of looking: along -Y or along -Z.
+#[derive(Clone, Copy, Debug)]
+struct View {
+    name: &'static str,
+    /// The coordinate that goes down, or up.
+    axis: usize,
+    goes_up: bool,
+    /// Upper edge and height in the drawing.
+    top: f64,
+    height: f64,
+    /// The smallest X and the smallest of the other coordinate, metres.
+    least: [f64; 2],
+    per_metre: f64,
+}
+
+impl Plan {
+    /// An empty picture of what a box holds.
+    pub fn new(caption: &str, around: Cuboid) -> Plan {
+        Plan {
+            kinds: Vec::new(),
+            marks: Vec::new(),
+            levels: Vec::new(),
+            shown: 0,
+            caption: caption.into(),
+            views: views(around),
+            shades: None,
+        }
+    }
+
+    /// Adds to the density that is drawn below everything.
+    pub fn shade(&mut self, at: Vec3, weight: f64) {
+        let views = self.views;
+        let cells = |length: f64| (length / CELL).ceil().max(1.0) as u32;
+        let new = || views.map(|view| Shade::new(cells(View::WIDTH), cells(view.height)));
+        for (shade, view) in self.shades.get_or_insert_with(new).iter_mut().zip(views) {
+            let [x, y] = view.at(at);
+            shade.add([(x - LEFT) / View::WIDTH, (y - view.top) / view.height], weight);
+        }
+    }
+}
+
+/// Both views of a box, with room around it.
+fn views(around: Cuboid) -> [View; 2] {
+    let (min, max) = (around.min.as_dvec3(), around.max.as_dvec3());
+    let longest = (max - min).max_element();
+    // A single point has no size: give it a metre.
+    let room = if longest > 0.0 { 0.04 * longest } else { 0.5 };
+    let (min, extent) = (min - room, max - min + 2.0 * room);
+    let per_metre = (View::WIDTH / extent.x).min(HEIGHTS[0] / extent.z).min(HEIGHTS[1] / extent.y);
+    let mut top = ABOVE;
+    let mut view = |name, axis: usize, goes_up| {
+        let height = (extent[axis] * per_metre).max(LEAST_HEIGHT);
+        let middle = |axis: usize| min[axis] + 0.5 * extent[axis];
+        let least =
+            [middle(0) - 0.5 * View::WIDTH / per_metre, middle(axis) - 0.5 * height / per_metre];
+        let view = View { name, axis, goes_up, top, height, least, per_metre };
+        top += height + BELOW + ABOVE;
+        view
+    };
+    [view("Plan, from above", 2, false), view("Elevation, from the front", 1, true)]
+}
+
+impl View {
+    const WIDTH: f64 = WIDTH - LEFT - RIGHT;
+
+    /// Where a place is in the drawing.
+    fn at(&self, p: Vec3) -> [f64; 2] {
+        let p = DVec3::from(p);
+        [
+            LEFT + (p.x - self.least[0]) * self.per_metre,
+            self.down((p[self.axis] - self.least[1]) * self.per_metre),
+        ]
+    }
+
+    /// How far down something is that is so far along.
+    fn down(&self, along: f64) -> f64 {
+        if self.goes_up { self.top + self.height - along } else { self.top + along }
+    }
+
+    fn write_axes(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        let View { top, height, least, per_metre, .. } = *self;
+        let bottom = top + height;
+        writeln!(
+            f,
+            "<text class=\"title\" x=\"{LEFT}\" y=\"{:.1}\">{}</text>",
+            top - 8.0,
+            self.name
+        )?;
+        for (at, label) in ticks(least[0], least[0] + View::WIDTH / per_metre, 8.0) {
+            let x = LEFT + (at - least[0]) * per_metre;
+            let below = bottom + 14.0;
+            writeln!(
+                f,
+                "<path class=\"grid\" d=\"M{x:.1} {top:.1}V{bottom:.1}\"/>\
+                 <text class=\"x\" x=\"{x:.1}\" y=\"{below:.1}\">{label}</text>"
+            )?;
+        }
+        for (at, label) in ticks(least[1], least[1] + height / per_metre, (height / 60.0).max(2.0))
+        {
+            let y = self.down((at - least[1]) * per_metre);
+            let (right, left) = (WIDTH - RIGHT, LEFT - 6.0);
+            writeln!(
+                f,
+                "<path class=\"grid\" d=\"M{LEFT} {y:.1}H{right}\"/>\
+                 <text class=\"y\" x=\"{left}\" y=\"{:.1}\">{label}</text>",
+                y + 4.0
+            )?;
+        }
+        let axis = ["x", "y", "z"][self.axis];
+        let (right, above) = (WIDTH - RIGHT, top - 8.0);
+        writeln!(
+            f,
+            "<text class=\"y\" x=\"{right}\" y=\"{above:.1}\">x across, {axis} {}, metres</text>",
+            if self.goes_up { "up" } else { "down" }
+        )?;
+        let width = View::WIDTH;
+        writeln!(
+            f,
+            "<rect class=\"frame\" x=\"{LEFT}\" y=\"{top:.1}\" width=\"{width}\" height=\"{height:.1}\"/>"
+        )
+    }
+
+    fn write_boxes(&self, f: &mut fmt::Formatter, boxes: &[Cuboid]) -> fmt::Result {
+        for Cuboid { min, max } in boxes {
+            let ([left, one], [right, other]) = (self.at(*min), self.at(*max));
+            let (width, top, height) = (right - left, one.min(other), (one - other).abs());
+            write!(f, "M{left:.1} {top:.1}h{width:.1}v{height:.1}h-{width:.1}z")?;
+        }
+        Ok(())
+    }
+}
+
+impl Part for Plan {}
+
+impl Display for Plan {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let caption = Escaped(&self.caption);
+        let [.., last] = self.views;
+        let height = last.top + last.height + BELOW;
+        writeln!(
+            f,
+            "<figure class=\"plan\">\n\
+             <svg viewBox=\"0 0 {WIDTH} {height:.1}\" role=\"img\" aria-label=\"{caption}\">"
+        )?;
+        let mut marks: Vec<&Mark> = self.marks.iter().collect();
+        // The heaviest below, so that they hide no other.
+        marks.sort_by(|a, b| b.weight.total_cmp(&a.weight));
+        for (number, view) in self.views.iter().enumerate() {
+            view.write_axes(f)?;
+            if let Some(shades) = &self.shades {
+                let (raster, width) = (shades[number].raster(), View::WIDTH);
+                writeln!(
+                    f,
+                    "<image href=\"{raster}\" x=\"{LEFT}\" y=\"{:.1}\" width=\"{width}\" \
+                     height=\"{:.1}\" preserveAspectRatio=\"none\"/>",
+                    view.top, view.height
+                )?;
+            }
+            for (row, level) in self.levels.iter().enumerate() {
+                let hidden = if row == self.shown { "" } else { " hidden" };
+                write!(f, "<path class=\"boxes\" data-level=\"{row}\"{hidden} d=\"")?;
+                view.write_boxes(f, &level.boxes)?;
+                f.write_str("\"/>\n")?;
+            }
+            let most = marks.first().map_or(1.0, |mark| f64::from(mark.weight));
+            for mark in &marks {
+                let [x, y] = view.at(mark.at);
+                let share = (f64::from(mark.weight) / most).clamp(0.0, 1.0);
+                let radius = (RADII[0] * share.sqrt()).max(RADII[1]);
+                let (class, label) = (mark.ink.class(), Escaped(&mark.label));
+                writeln!(
+                    f,
+                    "<circle class=\"{class}\" cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"{radius:.1}\">\
+                     <title>{label}</title></circle>"
+                )?;
+            }
+        }
+        writeln!(f, "</svg>\n<figcaption>{caption}")?;
+        for (ink, name) in &self.kinds {
+            let (class, name) = (ink.class(), Escaped(name));
+            writeln!(f, "<span class=\"key\"><i class=\"{class}\"></i>{name}</span>")?;
+        }
+        if let Some(last) = self.levels.len().checked_sub(1) {
+            let shown = self.shown;
+            writeln!(
+                f,
+                "<label class=\"key\"><i class=\"box\"></i>\
+                 <input type=\"range\" min=\"0\" max=\"{last}\" value=\"{shown}\">"
+            )?;
+            for (row, level) in self.levels.iter().enumerate() {
+                let hidden = if row == shown { "" } else { " hidden" };
+                let name = Escaped(&level.name);
+                writeln!(f, "<span data-level=\"{row}\"{hidden}>{name}</span>")?;
+            }
+            f.write_str("</label>")?;
+        }
+        f.write_str("</figcaption>\n</figure>\n")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Where a view draws the corners of a box.
+    fn drawn(around: Cuboid) -> [[[f64; 2]; 2]; 2] {
+        views(around).map(|view| [view.at(around.min), view.at(around.max)])
+    }
+
+    #[test]
+    fn everything_fits_and_both_views_are_in_line() {
+        let at = |x, y, z| Vec3::new(x, y, z);
+        for max in [at(40.0, 3.0, 9.0), at(1e-5, 7.0, 1e-4), at(0.0, 0.0, 0.0), at(1e9, 0.0, 1e6)] {
+            let around = Cuboid { min: at(-2.0, -3.0, -1.0).min(max), max };
+            let [plan, elevation] = drawn(around);
+            assert_eq!([plan[0][0], plan[1][0]], [elevation[0][0], elevation[1][0]]);
+            for (view, corners) in views(around).iter().zip([plan, elevation]) {
+                for [x, y] in corners {
+                    assert!((LEFT..=WIDTH - RIGHT).contains(&x), "{corners:?}");
+                    assert!((view.top..=view.top + view.height).contains(&y), "{corners:?}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn up_is_up_in_the_elevation_and_the_front_is_down_in_the_plan() {
+        let [plan, elevation] = drawn(Cuboid { min: Vec3::NEG_ONE, max: Vec3::ONE });
+        assert!(plan[1][1] > plan[0][1] && elevation[1][1] < elevation[0][1]);
+    }
+
+    #[test]
+    fn the_area_of_a_mark_is_in_proportion_to_its_weight() {
+        let mut plan = Plan::new("", Cuboid { min: Vec3::ZERO, max: Vec3::ONE });
+        for weight in [1.0, 4.0, 0.0] {
+            let mark = Mark { at: Vec3::ZERO, weight, ink: Ink::Blue, label: String::new() };
+            plan.marks.push(mark);
+        }
+        let html = plan.to_string();
+        let radii: Vec<&str> =
+            html.split(" r=\"").skip(1).map(|rest| rest.split('"').next().unwrap()).collect();
+        assert_eq!(radii, ["11.0", "5.5", "1.4", "11.0", "5.5", "1.4"]);
+    }
+}
