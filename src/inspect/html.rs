@@ -12,7 +12,7 @@ use crate::page::{
 /// Lights in the table, at most.
 const MOST_ROWS: usize = 1_000;
 /// Lights that are drawn one by one, at most; all are in the ground of density.
-const MOST_MARKS: usize = 5_000;
+const MOST_MARKS: usize = 10_000;
 /// Boxes of a level, at most: beyond, they hide each other.
 const MOST_BOXES: usize = 2_000;
 /// The level that is shown first has at most so many.
@@ -52,12 +52,10 @@ pub fn html<D: AsRef<[u8]>>(
 }
 
 fn summary(page: &mut Page, report: &TreeReport) {
-    let still = report.lights - report.changing;
     page.facts([
         ("lights", count(report.lights)),
         ("emitters", count(report.emitters)),
         ("energy", format!("{} cd", rounded(report.energy))),
-        ("stand still", count(still)),
         ("change", count(report.changing)),
         ("forced", count(report.forced)),
         (
@@ -111,7 +109,7 @@ fn plan<D: AsRef<[u8]>>(tree: &LightTree<D>, report: &TreeReport, boxes: &[Aabb]
     );
     if is_shaded {
         caption +=
-            &format!(" The ground is the energy of all {} emitters.", count(report.emitters));
+            &format!(" The grey ground is the energy of all {} emitters.", count(report.emitters));
     }
     let mut plan = Plan::new(&caption, Cuboid { min: around.min, max: around.max });
     let mut inks = Vec::new();

@@ -1,11 +1,12 @@
 //! Marks in space, as an architect draws them: the plan, from above, and below it the elevation,
-//! from the front, in one scale and in line.
+//! from the side that is at the plan's lower edge, in one scale and in line. What is longer than it is
+//! wide lies across.
 
 use super::axes::ticks;
 use super::escape::Escaped;
 use super::shade::Shade;
 use super::{Ink, Part};
-use glam::{DVec3, Vec3};
+use glam::Vec3;
 use std::fmt::{self, Display};
 
 /// A box in space, metres, Y up.
@@ -64,22 +65,24 @@ const BELOW: f64 = 22.0;
 /// At most so high.
 const HEIGHTS: [f64; 2] = [520.0, 300.0];
 const LEAST_HEIGHT: f64 = 60.0;
-/// Radius of the heaviest mark and of the lightest.
+/// Radius of the heaviest mark, and of the lightest.
 const RADII: [f64; 2] = [11.0, 1.4];
+/// Marks cover no more of a picture than this, the lightest aside.
+const COVERED: f64 = 0.08;
 /// Side of a cell of the ground.
 const CELL: f64 = 2.0;
 
-/// One way of looking: along -Y or along -Z.
+/// One way of looking at a box.
 #[derive(Clone, Copy, Debug)]
 struct View {
     name: &'static str,
-    /// The coordinate that goes down, or up.
-    axis: usize,
+    /// The coordinate that goes across, and the one that goes down or up.
+    axes: [usize; 2],
     goes_up: bool,
     /// Upper edge and height in the drawing.
     top: f64,
     height: f64,
-    /// The smallest X and the smallest of the other coordinate, metres.
+    /// The smallest of both coordinates, metres.
     least: [f64; 2],
     per_metre: f64,
 }
@@ -110,6 +113,18 @@ impl Plan {
     }
 }
 
+impl Plan {
+    /// Radius over the square root of a weight: the heaviest as large as may be, unless all together
+    /// would cover too much.
+    fn radius_per_root(&self) -> f64 {
+        let weights = || self.marks.iter().map(|mark| f64::from(mark.weight));
+        let most = weights().fold(f64::MIN_POSITIVE, f64::max);
+        let free = COVERED * View::WIDTH * self.views[0].height / std::f64::consts::PI;
+        let covered = (free / weights().map(|weight| weight / most).sum::<f64>()).sqrt();
+        RADII[0].min(covered) / most.sqrt()
+    }
+}
+
 /// Both views of a box, with room around it.
 fn views(around: Cuboid) -> [View; 2] {
     let (min, max) = (around.min.as_dvec3(), around.max.as_dvec3());
@@ -117,18 +132,26 @@ fn views(around: Cuboid) -> [View; 2] {
     // A single point has no size: give it a metre.
     let room = if longest > 0.0 { 0.04 * longest } else { 0.5 };
     let (min, extent) = (min - room, max - min + 2.0 * room);
-    let per_metre = (View::WIDTH / extent.x).min(HEIGHTS[0] / extent.z).min(HEIGHTS[1] / extent.y);
+    const X: usize = 0;
+    const Y: usize = 1;
+    const Z: usize = 2;
+    // X to the right, Z to the reader; or turned, Z to the right and X away from the reader.
+    let turned = extent.z > extent.x;
+    let [across, depth] = if turned { [Z, X] } else { [X, Z] };
+    let per_metre =
+        (View::WIDTH / extent[across]).min(HEIGHTS[0] / extent[depth]).min(HEIGHTS[1] / extent.y);
     let mut top = ABOVE;
     let mut view = |name, axis: usize, goes_up| {
         let height = (extent[axis] * per_metre).max(LEAST_HEIGHT);
-        let middle = |axis: usize| min[axis] + 0.5 * extent[axis];
-        let least =
-            [middle(0) - 0.5 * View::WIDTH / per_metre, middle(axis) - 0.5 * height / per_metre];
-        let view = View { name, axis, goes_up, top, height, least, per_metre };
+        let sides = [(across, View::WIDTH), (axis, height)];
+        let least = sides.map(|(axis, side)| min[axis] + 0.5 * (extent[axis] - side / per_metre));
+        let axes = [across, axis];
+        let view = View { name, axes, goes_up, top, height, least, per_metre };
         top += height + BELOW + ABOVE;
         view
     };
-    [view("Plan, from above", 2, false), view("Elevation, from the front", 1, true)]
+    let side = if turned { "Elevation, along x" } else { "Elevation, against z" };
+    [view("Plan, from above", depth, turned), view(side, Y, true)]
 }
 
 impl View {
@@ -136,11 +159,9 @@ impl View {
 
     /// Where a place is in the drawing.
     fn at(&self, p: Vec3) -> [f64; 2] {
-        let p = DVec3::from(p);
-        [
-            LEFT + (p.x - self.least[0]) * self.per_metre,
-            self.down((p[self.axis] - self.least[1]) * self.per_metre),
-        ]
+        let [across, along] =
+            [0, 1].map(|i| (f64::from(p[self.axes[i]]) - self.least[i]) * self.per_metre);
+        [LEFT + across, self.down(along)]
     }
 
     /// How far down something is that is so far along.
@@ -177,12 +198,12 @@ impl View {
                 y + 4.0
             )?;
         }
-        let axis = ["x", "y", "z"][self.axis];
+        let [across, along] = self.axes.map(|axis| ["x", "y", "z"][axis]);
+        let way = if self.goes_up { "up" } else { "down" };
         let (right, above) = (WIDTH - RIGHT, top - 8.0);
         writeln!(
             f,
-            "<text class=\"y\" x=\"{right}\" y=\"{above:.1}\">x across, {axis} {}, metres</text>",
-            if self.goes_up { "up" } else { "down" }
+            "<text class=\"y\" x=\"{right}\" y=\"{above:.1}\">{across} across, {along} {way}, metres</text>"
         )?;
         let width = View::WIDTH;
         writeln!(
@@ -216,6 +237,7 @@ impl Display for Plan {
         let mut marks: Vec<&Mark> = self.marks.iter().collect();
         // The heaviest below, so that they hide no other.
         marks.sort_by(|a, b| b.weight.total_cmp(&a.weight));
+        let per_root = self.radius_per_root();
         for (number, view) in self.views.iter().enumerate() {
             view.write_axes(f)?;
             if let Some(shades) = &self.shades {
@@ -233,11 +255,9 @@ impl Display for Plan {
                 view.write_boxes(f, &level.boxes)?;
                 f.write_str("\"/>\n")?;
             }
-            let most = marks.first().map_or(1.0, |mark| f64::from(mark.weight));
             for mark in &marks {
                 let [x, y] = view.at(mark.at);
-                let share = (f64::from(mark.weight) / most).clamp(0.0, 1.0);
-                let radius = (RADII[0] * share.sqrt()).max(RADII[1]);
+                let radius = (f64::from(mark.weight).sqrt() * per_root).max(RADII[1]);
                 let (class, label) = (mark.ink.class(), Escaped(&mark.label));
                 writeln!(
                     f,
@@ -246,7 +266,7 @@ impl Display for Plan {
                 )?;
             }
         }
-        writeln!(f, "</svg>\n<figcaption>{caption}")?;
+        writeln!(f, "</svg>\n<figcaption>{caption}\n<div>")?;
         for (ink, name) in &self.kinds {
             let (class, name) = (ink.class(), Escaped(name));
             writeln!(f, "<span class=\"key\"><i class=\"{class}\"></i>{name}</span>")?;
@@ -265,7 +285,7 @@ impl Display for Plan {
             }
             f.write_str("</label>")?;
         }
-        f.write_str("</figcaption>\n</figure>\n")
+        f.write_str("</div>\n</figcaption>\n</figure>\n")
     }
 }
 
@@ -281,8 +301,9 @@ mod tests {
     #[test]
     fn everything_fits_and_both_views_are_in_line() {
         let at = |x, y, z| Vec3::new(x, y, z);
-        for max in [at(40.0, 3.0, 9.0), at(1e-5, 7.0, 1e-4), at(0.0, 0.0, 0.0), at(1e9, 0.0, 1e6)] {
-            let around = Cuboid { min: at(-2.0, -3.0, -1.0).min(max), max };
+        let far = [at(40.0, 3.0, 9.0), at(9.0, 3.0, 40.0), at(1e-5, 7.0, 1e-4), at(1e9, 0.0, 1e6)];
+        for max in far.into_iter().chain([at(-2.0, -3.0, -1.0)]) {
+            let around = Cuboid { min: at(-2.0, -3.0, -1.0), max };
             let [plan, elevation] = drawn(around);
             assert_eq!([plan[0][0], plan[1][0]], [elevation[0][0], elevation[1][0]]);
             for (view, corners) in views(around).iter().zip([plan, elevation]) {
@@ -295,9 +316,13 @@ mod tests {
     }
 
     #[test]
-    fn up_is_up_in_the_elevation_and_the_front_is_down_in_the_plan() {
-        let [plan, elevation] = drawn(Cuboid { min: Vec3::NEG_ONE, max: Vec3::ONE });
-        assert!(plan[1][1] > plan[0][1] && elevation[1][1] < elevation[0][1]);
+    fn both_views_are_seen_and_none_is_mirrored() {
+        for (max, turned) in [(Vec3::new(2.0, 1.0, 1.0), false), (Vec3::new(1.0, 1.0, 2.0), true)] {
+            let [plan, elevation] = drawn(Cuboid { min: Vec3::ZERO, max });
+            // In the plan X to the right and Z down, or Z to the right and X up: Y looks at the reader.
+            assert_eq!(plan[1][1] < plan[0][1], turned);
+            assert!(plan[1][0] > plan[0][0] && elevation[1][1] < elevation[0][1]);
+        }
     }
 
     #[test]
@@ -311,5 +336,15 @@ mod tests {
         let radii: Vec<&str> =
             html.split(" r=\"").skip(1).map(|rest| rest.split('"').next().unwrap()).collect();
         assert_eq!(radii, ["11.0", "5.5", "1.4", "11.0", "5.5", "1.4"]);
+    }
+
+    #[test]
+    fn many_marks_are_small() {
+        let mut plan = Plan::new("", Cuboid { min: Vec3::ZERO, max: Vec3::ONE });
+        let mark = Mark { at: Vec3::ZERO, weight: 3.0, ink: Ink::Blue, label: String::new() };
+        plan.marks = vec![mark; 1000];
+        let area = 1000.0 * std::f64::consts::PI * 3.0 * plan.radius_per_root().powi(2);
+        let [view, _] = plan.views;
+        assert!((area / (View::WIDTH * view.height) / COVERED - 1.0).abs() < 1e-9);
     }
 }

@@ -12,8 +12,8 @@ pub struct Shade {
 
 /// Cells that weigh so much less than the heaviest are as faint as can be.
 const FAINTEST: f64 = 1e-4;
-/// A lamp's yellow, which can be told from black and from white.
-const COLOR: [u8; 3] = [226, 160, 32];
+/// Can be told from black and from white.
+const COLOR: [u8; 3] = [128, 128, 128];
 
 impl Shade {
     pub fn new(columns: u32, rows: u32) -> Shade {
