@@ -37,9 +37,10 @@ pub struct LightCard {
     pub color: Option<[f32; 3]>,
     /// Where it is; `None` at infinity.
     pub place: Option<Place>,
-    /// Where it aims, unit, world space; `None` if to all sides.
+    /// Where it aims, unit, world space; `None` if to all sides. Of a sun, where its light goes.
     pub axis: Option<[f32; 3]>,
-    /// How far off the axis light leaves it, degrees; 180 to all sides.
+    /// How far off the axis light leaves it, degrees; 180 to all sides. Of a sun, half its angular
+    /// diameter.
     pub half_angle_deg: f32,
     /// Beyond this distance it gives no light, metres; `None` is physical.
     pub range_m: Option<f32>,

@@ -1,6 +1,6 @@
 //! Floor 6: what changed between two versions of a scene, as far as its light goes.
 //!
-//! A version is a `Side`: a scene, or the tree file that was built from it. `compare` matches the
+//! A version is a [`Side`]: a scene, or the tree file that was built from it. [`compare`] matches the
 //! lights of both and says which were added, removed, dirtied or renamed, of the dirtied *what*
 //! changed and *by how much*, and what that does to picking. Prims that send no light are not
 //! compared; where they change what the camera sees of the lights, the [`HeatMap`] shows it.
@@ -17,16 +17,30 @@
 //! | `picking` | how far the probabilities of picks moved |
 //! | `heat` | where in a camera's view direct light changed |
 
+mod amounts;
 mod card;
 mod change;
+mod compare;
+mod describe;
 mod heat;
+mod infinite;
+mod light;
+mod matching;
+mod pairs;
 mod picking;
+mod probes;
+mod profile;
+mod scene_side;
+mod side;
 mod totals;
+mod tree_side;
 
 pub use card::{Kind, LightCard, Place};
 pub use change::{Change, Difference, Verb};
+pub use compare::{DiffOptions, compare};
 pub use heat::{HeatCell, HeatMap};
 pub use picking::{PickingChange, ProbePlaces};
+pub use side::{Side, SideError};
 pub use totals::{Tally, Totals};
 
 use serde::Serialize;
