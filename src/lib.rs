@@ -9,11 +9,12 @@
 //!
 //! # A tour
 //!
-//! The house has seven floors; a room imports only from floors below its own.
+//! The house has eight floors; a room imports only from floors below its own.
 //!
 //! | floor | rooms | |
 //! |---|---|---|
-//! | 6 | `bin/candelabra`, `bin/candelabra-render` | arguments, progress, exit codes |
+//! | 7 | `bin/candelabra`, `bin/candelabra-render` | arguments, progress, exit codes |
+//! | 6 | [`diff`] | what changed between two versions of a scene, and by how much |
 //! | 5 | [`pipeline`] | jobs and stages: the only place where ingest meets the tree |
 //! | 4 | [`measure`] | strategies side by side: exact variance, error against time |
 //! | 3 | [`render`] | a path tracer that finds its lights through the tree |
@@ -56,6 +57,7 @@
 //! The tree file is specified in [`store`]; what a glTF file carries beyond glTF, in [`ingest`].
 
 pub mod bounds;
+pub mod diff;
 pub mod emitter;
 pub mod ingest;
 pub mod inspect;

@@ -59,7 +59,7 @@ impl<D: AsRef<[u8]> + Sync> LightTree<D> {
         for (row, light) in self.lights().iter().enumerate() {
             let rule = if u64::from(light.first_emitter) != next_emitter {
                 Some("its emitters do not follow those of the light before it")
-            } else if light.class > 7 || light.class & 5 == 4 || light.reserved != [0; 2] {
+            } else if light.class > 7 || light.class & 5 == 4 || !light.look.is_sound() {
                 Some("a field has an impossible value")
             } else if !(light.energy.is_finite() && light.energy >= 0.0) {
                 Some("its energy is not a number")

@@ -3,7 +3,9 @@
 //! `cargo bench --bench light_tree`
 
 use candelabra::bounds::{Aabb, Cone, LightBounds};
-use candelabra::light_tree::{LightSummary, LightTree, LightTreeWriter, Link, Receiver, TreeKind};
+use candelabra::light_tree::{
+    LightLook, LightSummary, LightTree, LightTreeWriter, Link, Receiver, TreeKind,
+};
 use candelabra::math::random::{hash, widen};
 use candelabra::pipeline::open_tree;
 use candelabra::store::AlignedBytes;
@@ -51,6 +53,7 @@ fn build(bounds: &[LightBounds]) -> AlignedBytes {
         emitter_count: bounds.len() as u32,
         energy: 1.0,
         class: 0,
+        look: LightLook::default(),
     });
     writer.finish("{}", [0; 32])
 }
