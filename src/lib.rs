@@ -14,12 +14,12 @@
 //! | floor | rooms | |
 //! |---|---|---|
 //! | 7 | `bin/candelabra`, `bin/candelabra-render` | arguments, progress, exit codes |
-//! | 6 | [`diff`] | what changed between two versions of a scene, and by how much |
+//! | 6 | [`diff`], [`inspect`] | what changed between two versions of a scene; what is in one |
 //! | 5 | [`pipeline`] | jobs and stages: the only place where ingest meets the tree |
 //! | 4 | [`measure`] | strategies side by side: exact variance, error against time |
 //! | 3 | [`render`] | a path tracer that finds its lights through the tree |
 //! | 2 | [`ingest`], [`emitter`], [`light_tree`] | files to scene; scene to emitters; bounds to tree |
-//! | 1 | [`scene`], [`bounds`], [`store`] | a scene's tables; box, cone, energy; bytes on disk |
+//! | 1 | [`scene`], [`bounds`], [`store`], [`page`] | a scene's tables; box, cone, energy; bytes on disk; HTML |
 //! | 0 | [`math`] | frames, warps, sums, random numbers |
 //!
 //! The rooms `emitter` and `light_tree` meet in [`bounds::LightBounds`] alone: the tree is built over

@@ -16,6 +16,7 @@
 //! | `totals` | how many lights and how much of them, before and after |
 //! | `picking` | how far the probabilities of picks moved |
 //! | `heat` | where in a camera's view direct light changed |
+//! | `html` | a comparison as a page |
 
 mod amounts;
 mod card;
@@ -23,6 +24,7 @@ mod change;
 mod compare;
 mod describe;
 mod heat;
+mod html;
 mod infinite;
 mod light;
 mod matching;
@@ -39,6 +41,7 @@ pub use card::{Kind, LightCard, Place};
 pub use change::{Change, Difference, Verb};
 pub use compare::{DiffOptions, compare};
 pub use heat::{HeatCell, HeatMap};
+pub use html::html;
 pub use picking::{PickingChange, ProbePlaces};
 pub use side::{Side, SideError};
 pub use totals::{Tally, Totals};

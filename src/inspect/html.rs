@@ -124,7 +124,13 @@ fn plan<D: AsRef<[u8]>>(tree: &LightTree<D>, report: &TreeReport, boxes: &[Aabb]
         );
         let ink = ink(&light);
         inks.push(ink);
-        plan.marks.push(Mark { at: boxes[row].center(), weight: light.energy, ink, label });
+        plan.marks.push(Mark {
+            at: boxes[row].center(),
+            from: None,
+            weight: light.energy,
+            ink,
+            label,
+        });
     }
     let names = [
         (Ink::Blue, "stands still"),
@@ -167,7 +173,7 @@ fn lights<D: AsRef<[u8]>>(tree: &LightTree<D>, report: &TreeReport, boxes: &[Aab
     let number = |value: f64| Cell::Number(value, rounded(value));
     let rows = by_energy(tree).into_iter().take(MOST_ROWS).map(|row| {
         let light = light(tree, &tree.lights()[row], report.energy);
-        let mut words = vec![if light.changes { "changes" } else { "still" }];
+        let mut words = vec![light.kind, if light.changes { "changes" } else { "still" }];
         words.extend(light.forced.then_some("forced"));
         words.extend((light.placed && !light.forced).then_some("placed"));
         let mut cells = vec![

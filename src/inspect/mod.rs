@@ -26,5 +26,6 @@ pub use report::{FrameSpan, LightReport, SectionReport, TreeReport};
 pub use scene::{CameraReport, SceneReport};
 pub use shape::{Shape, shapes};
 
-/// The version of the reports' fields: a reader of JSON that knows this one finds what it knows.
-pub const SCHEMA: u32 = 1;
+/// The version of the reports as JSON: in it fields may be added, and none changes or goes. Units are
+/// candela, metres and degrees; shares are in `[0, 1]`.
+pub const VERSION: u32 = 1;

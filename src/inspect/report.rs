@@ -1,15 +1,17 @@
 //! What a tree file is, in numbers.
 
-use super::SCHEMA;
+use super::VERSION;
 use super::shape::{Shape, shapes};
-use crate::light_tree::{LightRow, LightTree};
+use crate::light_tree::{LightLook, LightRow, LightTree};
 use serde::Serialize;
 
 /// A tree file.
 #[derive(Clone, Debug, Serialize)]
 pub struct TreeReport {
-    /// [`SCHEMA`].
-    pub schema: u32,
+    /// `candelabra.tree`.
+    pub schema: &'static str,
+    /// [`VERSION`](super::VERSION).
+    pub version: u32,
     /// The file, as it was named.
     pub file: String,
     /// Length of the file.
@@ -75,6 +77,10 @@ pub struct LightReport {
     pub share: f64,
     /// How many emitters it has.
     pub emitters: u32,
+    /// `mesh`, `point`, `spot` or `sphere`; `light` if the file does not tell.
+    pub kind: &'static str,
+    /// Its hue, linear Rec. 709, the largest component 1; `None` if it is dark.
+    pub color: Option<[f32; 3]>,
     /// Whether it has a tree of its own, which an instance places.
     pub placed: bool,
     /// Whether it changes with time.
@@ -95,7 +101,8 @@ impl TreeReport {
             Some(FrameSpan { first, last, count: frames.len() })
         };
         TreeReport {
-            schema: SCHEMA,
+            schema: "candelabra.tree",
+            version: VERSION,
             file: file.into(),
             bytes: tree.byte_length(),
             bytes_per_emitter: tree.byte_length() as f64 / emitters.max(1) as f64,
@@ -147,6 +154,14 @@ pub fn light<D: AsRef<[u8]>>(tree: &LightTree<D>, row: &LightRow, total: f64) ->
         energy: row.energy,
         share: if total > 0.0 { f64::from(row.energy) / total } else { 0.0 },
         emitters: row.emitter_count,
+        kind: match row.look.kind {
+            LightLook::MESH => "mesh",
+            LightLook::POINT => "point",
+            LightLook::SPOT => "spot",
+            LightLook::SPHERE => "sphere",
+            _ => "light",
+        },
+        color: row.look.hue().map(Into::into),
         placed: row.is(LightRow::PLACED),
         changes: row.is(LightRow::CHANGES),
         forced: row.is(LightRow::FORCED),

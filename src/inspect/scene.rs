@@ -1,6 +1,6 @@
 //! What is in a scene, and what it requires.
 
-use super::SCHEMA;
+use super::VERSION;
 use super::report::FrameSpan;
 use crate::emitter::Emitters;
 use crate::pipeline;
@@ -10,8 +10,10 @@ use serde::Serialize;
 /// A scene.
 #[derive(Clone, Debug, Serialize)]
 pub struct SceneReport {
-    /// [`SCHEMA`].
-    pub schema: u32,
+    /// `candelabra.scene`.
+    pub schema: &'static str,
+    /// [`VERSION`](super::VERSION).
+    pub version: u32,
     /// The file.
     pub file: String,
     /// Transforms.
@@ -59,7 +61,8 @@ impl SceneReport {
         let triangles_of = |mesh: u32| scene.meshes[mesh as usize].triangles.len();
         let frames = pipeline::frames_of(scene);
         SceneReport {
-            schema: SCHEMA,
+            schema: "candelabra.scene",
+            version: VERSION,
             file: scene.source.display().to_string(),
             nodes: scene.nodes.len(),
             meshes: scene.meshes.len(),

@@ -158,8 +158,13 @@ mod tests {
         });
         let mut plan = Plan::new(HOSTILE, Cuboid { min: Vec3::ZERO, max: Vec3::ONE });
         plan.kinds = vec![(Ink::Blue, HOSTILE.into())];
-        plan.marks =
-            vec![Mark { at: Vec3::ZERO, weight: 1.0, ink: Ink::Blue, label: HOSTILE.into() }];
+        plan.marks = vec![Mark {
+            at: Vec3::ZERO,
+            from: None,
+            weight: 1.0,
+            ink: Ink::Blue,
+            label: HOSTILE.into(),
+        }];
         plan.levels = vec![Level { name: HOSTILE.into(), boxes: vec![] }];
         page.add(&plan);
         page.add(&HeatMap {

@@ -23,6 +23,8 @@ pub struct Cuboid {
 pub struct Mark {
     /// Where, metres, Y up.
     pub at: Vec3,
+    /// Where it was, if that is to be shown: a line leads there.
+    pub from: Option<Vec3>,
     /// Its area is in proportion, down to a size that can still be seen. Not negative.
     pub weight: f32,
     /// Its colour, which [`Plan::kinds`] explains.
@@ -259,6 +261,12 @@ impl Display for Plan {
                 let [x, y] = view.at(mark.at);
                 let radius = (f64::from(mark.weight).sqrt() * per_root).max(RADII[1]);
                 let (class, label) = (mark.ink.class(), Escaped(&mark.label));
+                if let Some([x0, y0]) = mark.from.map(|from| view.at(from)) {
+                    writeln!(
+                        f,
+                        "<path class=\"trace {class}\" d=\"M{x0:.1} {y0:.1}L{x:.1} {y:.1}\"/>"
+                    )?;
+                }
                 writeln!(
                     f,
                     "<circle class=\"{class}\" cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"{radius:.1}\">\
@@ -329,7 +337,8 @@ mod tests {
     fn the_area_of_a_mark_is_in_proportion_to_its_weight() {
         let mut plan = Plan::new("", Cuboid { min: Vec3::ZERO, max: Vec3::ONE });
         for weight in [1.0, 4.0, 0.0] {
-            let mark = Mark { at: Vec3::ZERO, weight, ink: Ink::Blue, label: String::new() };
+            let mark =
+                Mark { at: Vec3::ZERO, from: None, weight, ink: Ink::Blue, label: String::new() };
             plan.marks.push(mark);
         }
         let html = plan.to_string();
@@ -341,7 +350,8 @@ mod tests {
     #[test]
     fn many_marks_are_small() {
         let mut plan = Plan::new("", Cuboid { min: Vec3::ZERO, max: Vec3::ONE });
-        let mark = Mark { at: Vec3::ZERO, weight: 3.0, ink: Ink::Blue, label: String::new() };
+        let mark =
+            Mark { at: Vec3::ZERO, from: None, weight: 3.0, ink: Ink::Blue, label: String::new() };
         plan.marks = vec![mark; 1000];
         let area = 1000.0 * std::f64::consts::PI * 3.0 * plan.radius_per_root().powi(2);
         let [view, _] = plan.views;

@@ -2,6 +2,7 @@
 
 mod build;
 mod files;
+mod inspect;
 mod lights;
 mod render;
 mod resume;
