@@ -1,6 +1,7 @@
 //! `candelabra`: builds light trees and looks into them.
 
 mod build;
+mod diff;
 mod inspect;
 mod measure;
 mod race;
@@ -21,6 +22,8 @@ struct Arguments {
 enum Command {
     /// Build the light trees of a scene and write them to a file
     Build(build::Arguments),
+    /// Compare two versions of a scene, or their trees: which lights changed, and by how much
+    Diff(diff::Arguments),
     /// Print what is in a scene or in a tree file, and what the scene requires
     Inspect(inspect::Arguments),
     /// Compute exactly how far off each strategy of picking lights is, at points of a picture
@@ -30,19 +33,25 @@ enum Command {
 }
 
 fn main() -> ExitCode {
-    let outcome = match Arguments::parse().command {
-        Command::Build(arguments) => build::run(&arguments),
-        Command::Inspect(arguments) => inspect::run(&arguments),
-        Command::Measure(arguments) => measure::run(&arguments),
-        Command::Race(arguments) => race::run(&arguments),
+    let command = Arguments::parse().command;
+    let done = |()| ExitCode::SUCCESS;
+    let outcome = match &command {
+        Command::Build(arguments) => build::run(arguments).map(done),
+        Command::Diff(arguments) => diff::run(arguments),
+        Command::Inspect(arguments) => inspect::run(arguments).map(done),
+        Command::Measure(arguments) => measure::run(arguments).map(done),
+        Command::Race(arguments) => race::run(arguments).map(done),
     };
     match outcome {
-        Ok(()) => ExitCode::SUCCESS,
+        Ok(code) => code,
         // A reader that has seen enough (`| head`) is no failure.
         Err(error) if is_closed_pipe(&error) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("candelabra: {error:#}");
-            ExitCode::FAILURE
+            match command {
+                Command::Diff(_) => diff::TROUBLE.into(),
+                _ => ExitCode::FAILURE,
+            }
         }
     }
 }
