@@ -2,7 +2,7 @@
 
 use super::walk::{What, walk};
 use crate::light_tree::LightTree;
-use crate::page::rounded;
+use crate::page::Short;
 use std::fmt::{self, Display, Write};
 
 /// The clusters of a tree's first frame down to some depth, with their shares of the energy, their
@@ -21,7 +21,7 @@ pub fn dot<D: AsRef<[u8]>>(tree: &LightTree<D>, depth: usize) -> String {
     });
     walk(tree, |stop| {
         let share = stop.energy / total;
-        let [x, y, z] = stop.aabb.extent().to_array().map(|side| rounded(side.into()));
+        let [x, y, z] = stop.aabb.extent().to_array().map(|side| Short(side.into()));
         let cone = stop.node.bounds().cone;
         let [theta_o, theta_e] = [cone.theta_o, cone.theta_e].map(|a| a.to_degrees().round());
         let sides = if cone.two_sided { ", both sides" } else { "" };

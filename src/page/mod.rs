@@ -14,19 +14,19 @@
 //! | `shade` | marks too many to be drawn, as a ground of density |
 //! | `heat` | a [`HeatMap`]: numbers on a grid as colours |
 //! | `raster` | pixels as an image inside the page |
-//! | `numbers` | numbers as people read them |
+//! | `number` | numbers as people read them |
 
 mod axes;
 mod escape;
 mod heat;
-mod numbers;
+mod number;
 mod plan;
 mod raster;
 mod shade;
 mod table;
 
 pub use heat::{HeatMap, Scale};
-pub use numbers::{bytes, count, rounded};
+pub use number::{Count, Short, Triple, counted};
 pub use plan::{Cuboid, Level, Mark, Plan};
 pub use table::{Cell, Column, Table};
 

@@ -1,7 +1,7 @@
 //! A table whose headings sort it.
 
 use super::escape::Escaped;
-use super::{Ink, Part};
+use super::{Count, Ink, Part, Short};
 use std::fmt::{self, Display};
 
 /// Rows under headings. A click on a heading sorts: numbers from the largest, text from A; another
@@ -46,6 +46,18 @@ pub enum Cell {
     Number(f64, String),
     /// Nothing; sorted as the smallest.
     Empty,
+}
+
+impl Cell {
+    /// A count.
+    pub fn count(count: usize) -> Cell {
+        Cell::Number(count as f64, Count(count).to_string())
+    }
+
+    /// A quantity, in few digits.
+    pub fn short(quantity: f64) -> Cell {
+        Cell::Number(quantity, Short(quantity).to_string())
+    }
 }
 
 impl Part for Table {}

@@ -4,9 +4,10 @@ https://chromedevtools.github.io/devtools-protocol
 """
 
 import base64
+import fcntl
 import json
 import os
-import subprocess
+import signal
 import tempfile
 from pathlib import Path
 
@@ -16,15 +17,16 @@ class Browser:
 
     def __init__(self, program: str) -> None:
         self._profile = tempfile.TemporaryDirectory(ignore_cleanup_errors=True)
-        inbox, self._out = os.pipe()
-        self._in, outbox = os.pipe()
         flags = ["--headless", "--disable-gpu", "--hide-scrollbars", "--no-first-run", "--remote-debugging-pipe"]
         flags.append(f"--user-data-dir={self._profile.name}")
         if os.geteuid() == 0:
             flags.append("--no-sandbox")
-        # The browser reads from descriptor 3 and writes to 4.
-        command = ["sh", "-c", f'exec "$@" 3<&{inbox} 4>&{outbox} 2>/dev/null', "sh", program, *flags]
-        self._process = subprocess.Popen(command, pass_fds=(inbox, outbox))
+        # The browser reads from descriptor 3 and writes to 4; neither end may be one of them before.
+        ends = [fcntl.fcntl(end, fcntl.F_DUPFD_CLOEXEC, 10) for pair in (os.pipe(), os.pipe()) for end in pair]
+        inbox, self._out, self._in, outbox = ends
+        actions = [(os.POSIX_SPAWN_DUP2, inbox, 3), (os.POSIX_SPAWN_DUP2, outbox, 4)]
+        actions.append((os.POSIX_SPAWN_OPEN, 2, os.devnull, os.O_WRONLY, 0))
+        self._process = os.posix_spawn(program, [program, *flags], os.environ, file_actions=actions)
         os.close(inbox)
         os.close(outbox)
         self._buffer, self._number, self._session = b"", 0, None
@@ -35,8 +37,8 @@ class Browser:
             self.call(f"{domain}.enable")
 
     def close(self) -> None:
-        self._process.terminate()
-        self._process.wait()
+        os.kill(self._process, signal.SIGTERM)
+        os.waitpid(self._process, 0)
         self._profile.cleanup()
 
     def call(self, method: str, **parameters) -> dict:

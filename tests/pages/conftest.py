@@ -12,7 +12,7 @@ import pytest
 from browser import Browser
 
 ROOT = Path(__file__).resolve().parents[2]
-HOSTILE = "<script>document.title = 'broken'</script>\"'&amp;<img src=x onerror=alert(1)>灯"
+HOSTILE = "<script>document.title = 'broken'<script>\"'&amp;<img src=x onerror=alert(1)>灯"
 """A prim that would be markup if a page let it."""
 
 

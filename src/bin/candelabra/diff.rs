@@ -1,7 +1,8 @@
 //! `candelabra diff`: what changed between two versions of a scene, and by how much.
 
+use crate::page;
 use anyhow::{Result, bail};
-use candelabra::diff::{DiffOptions, Side, SideError, Text, compare, compare_folders};
+use candelabra::diff::{DiffOptions, Side, SideError, Text, compare, compare_folders, html};
 use clap::Args;
 use std::fmt::Display;
 use std::io::{self, BufWriter, StdoutLock, Write};
@@ -24,6 +25,9 @@ pub struct Arguments {
     /// Print JSON (schema candelabra.diff, version 1), which lists them all
     #[arg(long)]
     json: bool,
+    /// Write a page too, with pictures of the lights and of what the camera sees; not of folders
+    #[arg(long, value_name = "FILE")]
+    html: Option<PathBuf>,
     /// Threads; as many as there are cores if not given
     #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
@@ -43,9 +47,18 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     match [before, after].map(|path| path.is_dir()) {
         [false, false] => {
             let (before, after) = rayon::join(|| Side::open(before), || Side::open(after));
-            let diff = compare(&before?, &after?, &DiffOptions::default())?;
+            let (before, after) = (before?, after?);
+            let for_page = arguments.html.is_some();
+            let options = DiffOptions { unchanged: for_page, heat: for_page };
+            let diff = compare(&before, &after, &options)?;
+            if let Some(page) = &arguments.html {
+                page::write(page, &html(&diff), &[&arguments.before, &arguments.after])?;
+            }
             print(arguments, |out| diff.write_json(out), |most| Text { of: &diff, most })?;
             Ok(if diff.is_same() { ExitCode::SUCCESS } else { DIFFERENT.into() })
+        }
+        [true, true] if arguments.html.is_some() => {
+            bail!("{}: a page compares two files, and these are folders", before.display())
         }
         [true, true] => {
             let diff = compare_folders(before, after)?;

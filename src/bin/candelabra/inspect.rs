@@ -1,15 +1,15 @@
 //! `candelabra inspect`: what is in a scene or in a tree file.
 
-use anyhow::{Context, Result, bail};
+use crate::page;
+use anyhow::{Context, Result};
 use candelabra::emitter::Emitters;
 use candelabra::inspect::{self, SceneReport, TreeReport};
 use candelabra::light_tree::LightTree;
 use candelabra::pipeline::{self, BuildOptions};
-use candelabra::store::write_atomically;
 use clap::Args;
 use serde::Serialize;
 use std::io::Write;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 #[derive(Args)]
 pub struct Arguments {
@@ -75,14 +75,7 @@ fn show_tree<D: AsRef<[u8]>>(
         return Ok(());
     }
     let Some(page) = &arguments.html else { return print_tree(&mut out, &report) };
-    let real = |path: &Path| path.canonicalize().ok();
-    if real(page).is_some() && real(page) == real(&arguments.file) {
-        bail!("{}: is the file to be inspected; choose another page", page.display());
-    }
-    let html = inspect::html(tree, &report, scene);
-    write_atomically(page, |file| file.write_all(html.as_bytes()))?;
-    writeln!(out, "{}: {} bytes", page.display(), html.len())?;
-    Ok(())
+    page::write(page, &inspect::html(tree, &report, scene), &[&arguments.file])
 }
 
 fn print_json(report: &impl Serialize) -> Result<()> {

@@ -4,6 +4,7 @@ mod build;
 mod diff;
 mod inspect;
 mod measure;
+mod page;
 mod race;
 mod shot;
 

@@ -1,10 +1,10 @@
 //! One change as a sentence.
 
-use super::number::{Short, Triple, counted};
 use crate::diff::{Change, Difference, Kind, LightCard, Verb};
+use crate::page::{Short, Triple, counted};
 
 /// What is said of a change after its path.
-pub(super) fn details(change: &Change) -> String {
+pub fn details(change: &Change) -> String {
     let mut parts: Vec<String> = Vec::new();
     match (change.verb, &change.before, &change.after) {
         (Verb::Added, _, Some(card)) | (Verb::Removed, Some(card), _) => {

@@ -1,12 +1,12 @@
 //! A comparison for people.
 
 mod change;
-mod number;
 
 use super::{Diff, FolderDiff, Outcome, PickingChange, ProbePlaces, Verb};
-use change::details;
-use number::{Count, Short, Triple, counted};
+use crate::page::{Count, Short, Triple, counted};
 use std::fmt;
+
+pub(super) use change::details;
 
 /// A comparison, to be printed with at most so many changes: those that matter most.
 #[derive(Clone, Copy)]

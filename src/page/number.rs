@@ -4,7 +4,10 @@ use std::fmt;
 
 /// A count with its thousands apart: `1,204`.
 #[derive(Clone, Copy, PartialEq, Eq)]
-pub(super) struct Count(pub usize);
+pub struct Count(
+    /// The count.
+    pub usize,
+);
 
 impl fmt::Display for Count {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -21,13 +24,16 @@ impl fmt::Display for Count {
 }
 
 /// A count of something: `1 light`, `1,204 lights`.
-pub(super) fn counted(count: usize, what: &str) -> String {
+pub fn counted(count: usize, what: &str) -> String {
     format!("{} {what}{}", Count(count), if count == 1 { "" } else { "s" })
 }
 
 /// A quantity in four significant digits, without zeros at its end: `0.25`, `1.204e7`.
 #[derive(Clone, Copy)]
-pub(super) struct Short(pub f64);
+pub struct Short(
+    /// The quantity.
+    pub f64,
+);
 
 impl fmt::Display for Short {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -55,7 +61,10 @@ fn trimmed(digits: &str) -> &str {
 
 /// Three quantities: `(1, 0.25, -3)`.
 #[derive(Clone, Copy)]
-pub(super) struct Triple(pub [f32; 3]);
+pub struct Triple(
+    /// The quantities.
+    pub [f32; 3],
+);
 
 impl fmt::Display for Triple {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
