@@ -170,3 +170,98 @@ impl<'a, D: AsRef<[u8]>, F: FnMut(&Stop) -> bool> Walk<'a, D, F> {
         self.tree.lights().partition_point(|light| light.first_emitter <= emitter) - 1
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bounds::{Cone, LightBounds};
+    use crate::light_tree::{LightLook, LightRow, LightSummary, LightTreeWriter};
+    use crate::math::Similarity;
+    use crate::store::AlignedBytes;
+    use glam::Quat;
+
+    fn lamp(at: Vec3, energy: f32) -> LightBounds {
+        let aabb = Aabb { min: at, max: at };
+        LightBounds { aabb, cone: Cone::ALL, energy, range_m: f32::INFINITY }
+    }
+
+    /// A lamp of its own, and a string of twelve that is put somewhere: turned, larger, brighter.
+    fn placed_string(place: &Affine3A) -> LightTree<AlignedBytes> {
+        let string: Vec<_> = (0..12).map(|i| lamp(Vec3::X * i as f32, 1.0)).collect();
+        let mut writer = LightTreeWriter::default();
+        let shared = writer.add_tree(TreeKind::Shared, &string, |i| Link::Emitter(i as u32));
+        let shared = shared.unwrap();
+        let own = writer.bounds_of(shared);
+        let to_local = Similarity::undoing(place).unwrap();
+        let instance = writer.add_instance(shared, to_local, 1);
+        let around = own.aabb.transformed(place);
+        let room = Vec3::splat(1e-3);
+        let aabb = Aabb { min: around.min - room, max: around.max + room };
+        let still = [lamp(Vec3::ZERO, 5.0), LightBounds { aabb, energy: 36.0, ..own }];
+        let links = [Link::Emitter(0), Link::Instance(instance)];
+        writer.add_tree(TreeKind::Still, &still, |i| links[i]);
+        for (path, emitter_count, energy, class) in
+            [("/lamp", 1, 5.0, 0), ("/string", 12, 36.0, LightRow::PLACED)]
+        {
+            let (path, fingerprint, look) = (path.into(), [0; 32], LightLook::default());
+            let light = LightSummary { path, fingerprint, emitter_count, energy, class, look };
+            writer.add_light(&light);
+        }
+        let tree = LightTree::open(writer.finish("{}", [0; 32])).unwrap();
+        tree.verify().unwrap();
+        tree
+    }
+
+    #[test]
+    fn what_is_placed_stands_where_it_is_placed() {
+        let place = Affine3A::from_scale_rotation_translation(
+            Vec3::splat(2.0),
+            Quat::from_rotation_y(1.0),
+            Vec3::new(0.0, 3.0, 100.0),
+        );
+        let tree = placed_string(&place);
+        let mut stops = Vec::new();
+        walk(&tree, |stop| {
+            stops.push(*stop);
+            true
+        });
+        let emitters = |row| stops.iter().filter(move |stop| stop.what == What::Emitter(row));
+        assert_eq!((emitters(0).count(), emitters(1).count()), (1, 12));
+        assert!(emitters(1).all(|stop| (stop.energy - 3.0).abs() < 1e-6));
+        for i in 0..12 {
+            let wanted = place.transform_point3(Vec3::X * i as f32);
+            let is_there = |stop: &Stop| (stop.aabb.center() - wanted).length() < 1e-3;
+            assert_eq!(emitters(1).filter(|stop| is_there(stop)).count(), 1);
+        }
+    }
+
+    #[test]
+    fn parts_come_after_the_whole_and_make_it_up() {
+        let tree = placed_string(&Affine3A::from_translation(Vec3::new(7.0, 0.0, -5.0)));
+        let mut stops: Vec<Stop> = Vec::new();
+        walk(&tree, |stop| {
+            assert_eq!(stop.number, stops.len());
+            if let Some(parent) = stop.parent {
+                let parent = &stops[parent];
+                let room = Vec3::splat(1e-3);
+                let aabb = Aabb { min: parent.aabb.min - room, max: parent.aabb.max + room };
+                assert!(aabb.contains_box(&stop.aabb) && stop.depth == parent.depth + 1);
+            }
+            stops.push(*stop);
+            true
+        });
+        for whole in &stops {
+            let parts = stops.iter().filter(|part| part.parent == Some(whole.number));
+            let sum: f64 = parts.map(|part| part.energy).sum();
+            let is_leaf = matches!(whole.what, What::Emitter(_));
+            assert!(is_leaf || (sum / whole.energy - 1.0).abs() < 1e-6, "{whole:?}");
+        }
+        // Told not to, it goes no further.
+        let mut count = 0;
+        walk(&tree, |_| {
+            count += 1;
+            false
+        });
+        assert_eq!(count, 1);
+    }
+}

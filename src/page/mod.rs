@@ -173,7 +173,7 @@ mod tests {
             values: vec![1.0],
             scale: Scale::Gain { limit: 2.0, unit: HOSTILE.into() },
         });
-        let html = page.finish();
+        let html = page.finish().replace("<wbr>", "");
         let inert = "/World/&lt;script&gt;alert(&quot;1&quot;)&lt;/script&gt;&#39; onload=&#39;x&amp;amp;\u{202e}灯\u{fffd}";
         assert!(html.matches(inert).count() >= 12, "{html}");
         assert_eq!(html.matches("<script").count(), 1);

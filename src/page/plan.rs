@@ -237,8 +237,11 @@ impl Display for Plan {
              <svg viewBox=\"0 0 {WIDTH} {height:.1}\" role=\"img\" aria-label=\"{caption}\">"
         )?;
         let mut marks: Vec<&Mark> = self.marks.iter().collect();
-        // The heaviest below, so that they hide no other.
-        marks.sort_by(|a, b| b.weight.total_cmp(&a.weight));
+        // What is there and nothing more below, then the heaviest, so that they hide no other.
+        marks.sort_by(|a, b| {
+            let is_quiet = |mark: &Mark| mark.ink == Ink::Grey;
+            is_quiet(b).cmp(&is_quiet(a)).then(b.weight.total_cmp(&a.weight))
+        });
         let per_root = self.radius_per_root();
         for (number, view) in self.views.iter().enumerate() {
             view.write_axes(f)?;
@@ -345,6 +348,19 @@ mod tests {
         let radii: Vec<&str> =
             html.split(" r=\"").skip(1).map(|rest| rest.split('"').next().unwrap()).collect();
         assert_eq!(radii, ["11.0", "5.5", "1.4", "11.0", "5.5", "1.4"]);
+    }
+
+    #[test]
+    fn heavy_marks_hide_no_light_ones_and_grey_ones_none() {
+        let mut plan = Plan::new("", Cuboid { min: Vec3::ZERO, max: Vec3::ONE });
+        for (weight, ink) in [(1.0, Ink::Grey), (1.0, Ink::Blue), (2.0, Ink::Red), (2.0, Ink::Grey)]
+        {
+            let label = format!("{ink:?} {weight}");
+            plan.marks.push(Mark { at: Vec3::ZERO, from: None, weight, ink, label });
+        }
+        let html = plan.to_string();
+        let places = ["Grey 2", "Grey 1", "Red 2", "Blue 1"].map(|label| html.find(label).unwrap());
+        assert!(places.is_sorted(), "{html}");
     }
 
     #[test]

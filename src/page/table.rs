@@ -84,7 +84,11 @@ impl Display for Table {
 impl Display for Cell {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Cell::Text(text) => write!(f, "<td>{}</td>", Escaped(text)),
+            Cell::Text(text) => {
+                // A long path had best be broken after a slash.
+                let text = Escaped(text).to_string().replace('/', "/<wbr>");
+                write!(f, "<td>{text}</td>")
+            }
             Cell::Key(ink, text) => {
                 write!(f, "<td><i class=\"{}\"></i>{}</td>", ink.class(), Escaped(text))
             }

@@ -155,13 +155,8 @@ fn a_page_of_very_many_lights_is_small_and_says_what_it_leaves_out() {
 }
 
 #[test]
-fn a_page_does_not_replace_what_it_shows() {
+fn one_form_at_a_time() {
     let shot = lamps(1);
-    let tree = shot.read("shot.ltree");
-    shot.candelabra("inspect shot.ltree --html shot.ltree").ends(1).complains(&["shot.ltree"]);
-    assert_eq!(shot.read("shot.ltree"), tree);
-    shot.candelabra(&format!("inspect {SCENE} --html deep/page.html")).ends(0);
-    assert!(shot.read("deep/page.html").starts_with(b"<!DOCTYPE html>"));
     shot.candelabra("inspect shot.ltree --html a.html --json").ends(2);
     shot.candelabra("inspect shot.ltree --depth 3").ends(2);
 }

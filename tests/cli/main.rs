@@ -4,6 +4,7 @@ mod build;
 mod files;
 mod inspect;
 mod lights;
+mod pages;
 mod render;
 mod resume;
 mod trees;

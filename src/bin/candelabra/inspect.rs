@@ -5,6 +5,7 @@ use anyhow::{Context, Result};
 use candelabra::emitter::Emitters;
 use candelabra::inspect::{self, SceneReport, TreeReport};
 use candelabra::light_tree::LightTree;
+use candelabra::page::Short;
 use candelabra::pipeline::{self, BuildOptions};
 use clap::Args;
 use serde::Serialize;
@@ -151,8 +152,8 @@ fn print_tree(out: &mut impl Write, report: &TreeReport) -> Result<()> {
     }
     writeln!(out, "  heaviest lights")?;
     for light in &report.heaviest {
-        let share = 100.0 * light.share;
-        writeln!(out, "    {share:>6.2} %  {:>8} emitters  {}", light.emitters, light.path)?;
+        let share = Short(100.0 * light.share).to_string();
+        writeln!(out, "    {share:>9} %  {:>8} emitters  {}", light.emitters, light.path)?;
     }
     Ok(())
 }

@@ -51,8 +51,8 @@ fn summary(page: &mut Page, diff: &Diff) {
         facts.push(("from infinity, lux", both(&|tally| Short(tally.illuminance_lux).to_string())));
     }
     if let Some(picking) = &diff.picking {
-        facts.push(("picks that go elsewhere", format!("{} %", Short(100.0 * picking.mean))));
-        facts.push(("at the worst probe", format!("{} %", Short(100.0 * picking.worst))));
+        let [mean, worst] = [100.0 * picking.mean, 100.0 * picking.worst];
+        facts.push(("picks that go elsewhere", format!("{mean:.1} %, at worst {worst:.1} %")));
     }
     facts.extend([
         ("added", Count(totals.added).to_string()),
@@ -85,14 +85,14 @@ fn heat_maps(page: &mut Page, heat: &HeatMap) {
         heat.cells.iter().map(|cell| cell.as_ref().map_or(f32::NAN, of)).collect()
     };
     let both = [values(&|cell| cell.before_nits), values(&|cell| cell.after_nits)];
-    // One cell in ten may be brighter than white.
+    // One cell in fifty may be brighter than white.
     let mut nits: Vec<f32> = both.concat().into_iter().filter(|nits| *nits > 0.0).collect();
     nits.sort_by(f32::total_cmp);
-    let white = nits.get(nits.len() * 9 / 10).copied().unwrap_or(1.0);
+    let white = nits.get(nits.len() * 49 / 50).copied().unwrap_or(1.0);
     let [before, after] = both;
     let pictures = [
         (
-            "Change; none where it is dark before and after",
+            "Change",
             values(&HeatCell::stops),
             Scale::Gain { limit: MOST_STOPS, unit: "stops".into() },
         ),
@@ -140,5 +140,53 @@ fn table(diff: &Diff) -> Table {
         ),
         columns,
         rows: diff.changes.iter().take(MOST_ROWS).map(row).collect(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::diff::{Place, SideName, Totals};
+
+    fn card(path: String, x: f32) -> LightCard {
+        LightCard {
+            path,
+            kind: None,
+            emitters: 1,
+            energy: 2.0,
+            color: None,
+            place: Some(Place { center_m: [x, 0.0, 0.0], size_m: [0.0; 3] }),
+            axis: None,
+            half_angle_deg: 180.0,
+            range_m: None,
+            forced: false,
+            changes: false,
+        }
+    }
+
+    #[test]
+    fn very_many_changes_are_left_out_and_that_is_said() {
+        let change = |i: usize| Change {
+            verb: Verb::Dirtied,
+            share: 1e-4,
+            before: Some(card(format!("/lamp_{i}"), 0.0)),
+            after: Some(card(format!("/lamp_{i}"), i as f32)),
+            differences: Vec::new(),
+        };
+        let side = |file: &str| SideName { file: file.into(), is_tree: true };
+        let diff = Diff {
+            before: side("a.ltree"),
+            after: side("b.ltree"),
+            totals: Totals::default(),
+            picking: None,
+            changes: (0..MOST_ROWS + 4_000).map(change).collect(),
+            unchanged: Vec::new(),
+            heat: None,
+        };
+        let html = html(&diff);
+        assert_eq!(html.matches("<tr><td>").count(), MOST_ROWS);
+        assert!(html.contains("The 2,000 of 6,000 that matter most."));
+        assert_eq!(html.matches("<circle").count(), 2 * 5_000);
+        assert!(html.contains("the 5,000 heaviest of 6,000") && html.contains("a.ltree → b.ltree"));
     }
 }

@@ -37,18 +37,15 @@ pub fn plan<D: AsRef<[u8]>>(
     if around.is_empty() {
         return None;
     }
-    let is_shaded = report.emitters > report.lights.min(MOST_MARKS);
-    let mut caption = match report.lights > MOST_MARKS {
-        true => format!("The {} heaviest of {} lights", Count(MOST_MARKS), Count(report.lights)),
-        false => "All lights".into(),
-    };
-    caption += ", their area in proportion to their energy, down to a size that can be seen.";
+    let marks = marks(tree, report, boxes);
+    let is_shaded = report.emitters > marks.len();
+    let mut caption = caption(marks.len(), report.lights);
     if is_shaded {
         let emitters = Count(report.emitters);
         caption += &format!(" The grey ground is the energy of all {emitters} emitters.");
     }
     let mut plan = Plan::new(&caption, Cuboid { min: around.min, max: around.max });
-    plan.marks = marks(tree, report, boxes);
+    plan.marks = marks;
     let kinds = [
         (Ink::Blue, "stands still"),
         (Ink::Orange, "changes with time, here in the first frame"),
@@ -86,8 +83,22 @@ pub fn plan<D: AsRef<[u8]>>(
     Some(plan)
 }
 
+fn caption(drawn: usize, lights: usize) -> String {
+    let area = "their area in proportion to their energy, down to a size that can be seen.";
+    match (drawn, lights > MOST_MARKS) {
+        (0, true) => format!("Of {} lights none is heavier than the rest.", Count(lights)),
+        (_, true) => format!("The {} heaviest of {} lights, {area}", Count(drawn), Count(lights)),
+        (_, false) => format!("All lights, {area}"),
+    }
+}
+
+/// The heaviest lights: all of those with the same energy, or none.
 fn marks<D: AsRef<[u8]>>(tree: &LightTree<D>, report: &TreeReport, boxes: &[Aabb]) -> Vec<Mark> {
-    let rows = by_energy(tree).into_iter().take(MOST_MARKS).filter(|&row| !boxes[row].is_empty());
+    let rows = by_energy(tree);
+    let energy = |row: usize| tree.lights()[row].energy;
+    let left_out = rows.get(MOST_MARKS).map_or(f32::NEG_INFINITY, |&row| energy(row));
+    let rows = rows.into_iter().take_while(|&row| energy(row) > left_out);
+    let rows = rows.filter(|&row| !boxes[row].is_empty());
     let mark = |row: usize| {
         let light = light(tree, &tree.lights()[row], report.energy);
         let (energy, share) = (Short(light.energy.into()), Short(100.0 * light.share));
