@@ -1,5 +1,6 @@
 #!/bin/sh
-# Every check: format, lints, documentation, the Rust tests, the exporter's tests.
+# Every check: format, lints, documentation, the Rust tests, the exporter's tests, the pages in a
+# browser (if there is a Chromium).
 #
 # Tests that read the scenes of other people look for them in ../shared, or where CANDELABRA_SHARED
 # points, and are skipped if they are not there.
@@ -19,4 +20,6 @@ PROPTEST_RNG_SEED=${PROPTEST_RNG_SEED:-1} cargo test --quiet
 echo "== exporter"
 environment scripts/requirements.txt scripts/requirements-test.txt
 "$python" -m pytest --quiet tests/exporter
+echo "== pages"
+"$python" -m pytest --quiet -rs tests/pages
 echo "all checks pass"

@@ -9,16 +9,17 @@
 //!
 //! # A tour
 //!
-//! The house has seven floors; a room imports only from floors below its own.
+//! The house has eight floors; a room imports only from floors below its own.
 //!
 //! | floor | rooms | |
 //! |---|---|---|
-//! | 6 | `bin/candelabra`, `bin/candelabra-render` | arguments, progress, exit codes |
+//! | 7 | `bin/candelabra`, `bin/candelabra-render` | arguments, progress, exit codes |
+//! | 6 | [`diff`], [`inspect`] | what changed between two versions of a scene; what is in one |
 //! | 5 | [`pipeline`] | jobs and stages: the only place where ingest meets the tree |
 //! | 4 | [`measure`] | strategies side by side: exact variance, error against time |
 //! | 3 | [`render`] | a path tracer that finds its lights through the tree |
 //! | 2 | [`ingest`], [`emitter`], [`light_tree`] | files to scene; scene to emitters; bounds to tree |
-//! | 1 | [`scene`], [`bounds`], [`store`] | a scene's tables; box, cone, energy; bytes on disk |
+//! | 1 | [`scene`], [`bounds`], [`store`], [`page`] | a scene's tables; box, cone, energy; bytes on disk; HTML |
 //! | 0 | [`math`] | frames, warps, sums, random numbers |
 //!
 //! The rooms `emitter` and `light_tree` meet in [`bounds::LightBounds`] alone: the tree is built over
@@ -56,11 +57,14 @@
 //! The tree file is specified in [`store`]; what a glTF file carries beyond glTF, in [`ingest`].
 
 pub mod bounds;
+pub mod diff;
 pub mod emitter;
 pub mod ingest;
+pub mod inspect;
 pub mod light_tree;
 pub mod math;
 pub mod measure;
+pub mod page;
 pub mod pipeline;
 pub mod render;
 pub mod scene;

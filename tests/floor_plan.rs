@@ -5,13 +5,14 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Rooms by floor, from the ground up.
-const FLOORS: [&[&str]; 7] = [
+const FLOORS: [&[&str]; 8] = [
     &["math"],
-    &["scene", "bounds", "store"],
+    &["scene", "bounds", "store", "page"],
     &["ingest", "emitter", "light_tree"],
     &["render"],
     &["measure"],
     &["pipeline"],
+    &["diff", "inspect"],
     &["bin"],
 ];
 

@@ -45,6 +45,15 @@ impl Aabb {
         self.max - self.min
     }
 
+    /// Surface of the box plus a share of its squared diagonal, square metres: the `M_A` by which the
+    /// build weighs it. Scales like an area and still tells a short line of points from a long one, and
+    /// points on a line from a single point.
+    pub fn measure(&self) -> f64 {
+        const DIAGONAL_SHARE: f64 = 0.25;
+        let e = self.extent().as_dvec3();
+        2.0 * (e.x * e.y + e.y * e.z + e.z * e.x) + DIAGONAL_SHARE * e.length_squared()
+    }
+
     /// Whether a point is inside or on the surface.
     pub fn contains(&self, p: Vec3) -> bool {
         self.min.cmple(p).all() && p.cmple(self.max).all()

@@ -5,8 +5,9 @@
 //! stand in preorder: there is no bit trail to store, and no depth at which it ends. Along it every
 //! decision is weighed by the code that picks, so both agree to the last bits.
 
-use super::group::WIDTH;
+use super::group::{Group, WIDTH};
 use super::leaves::{Route, find_placed, lane_toward};
+use super::node::Link;
 use super::sampling::{FrameTree, Next, Place, Weights};
 use super::viewer::Viewer;
 
@@ -22,6 +23,47 @@ impl FrameTree<'_> {
             place.and_then(|place| self.walk(place, &self.route(emitter)?, 0))
         };
         probability.unwrap_or(0.0)
+    }
+
+    /// Calls `visit` with every emitter that is not forced and may be picked for a viewer, and the
+    /// [`probability`](FrameTree::probability) of that: of all of them in one walk.
+    pub fn for_each_probability(&self, viewer: &impl Viewer, mut visit: impl FnMut(u32, f64)) {
+        let mut open: Vec<_> =
+            self.place_of_root(viewer).map(|root| (root, 1.0)).into_iter().collect();
+        let mut reached = Vec::new();
+        while let Some((root, probability)) = open.pop() {
+            let groups = self.groups_of_tree_at(root.at);
+            reached.clear();
+            reached.resize(groups.len(), 0.0);
+            reached.iter_mut().take(1).for_each(|first| *first = probability);
+            // Groups stand in preorder: when one is met, the way to it has been.
+            for (at, group) in groups.iter().enumerate() {
+                let before: f64 = reached[at];
+                let weights = Weights::of(group, &root.viewer).filter(|_| before > 0.0);
+                let Some(weights) = weights else { continue };
+                for lane in (0..WIDTH).filter(|&lane| weights.of_lane[lane] > 0.0) {
+                    let probability = before * weights.share(lane);
+                    if let Link::Inner(ahead) = group.link(lane) {
+                        let below = reached.get_mut(at + ahead as usize);
+                        below.into_iter().for_each(|below| *below = probability);
+                        continue;
+                    }
+                    match self.follow(&root, group.link(lane)) {
+                        Some(Next::Emitter(emitter)) => visit(emitter, probability),
+                        Some(Next::Group(below)) => open.push((below, probability)),
+                        None => {}
+                    }
+                }
+            }
+        }
+    }
+
+    /// All groups of the tree that has its root's children here.
+    fn groups_of_tree_at(&self, first: u32) -> &[Group] {
+        let after = self.trees.partition_point(|tree| tree.first_group <= first);
+        let count = after.checked_sub(1).map_or(0, |row| self.trees[row].group_count);
+        let rest = self.groups.get(first as usize..).unwrap_or_default();
+        &rest[..rest.len().min(count as usize)]
     }
 
     pub(super) fn route(&self, emitter: u32) -> Option<Route> {

@@ -2,6 +2,7 @@
 
 use super::node::Node;
 use crate::math::Similarity;
+use crate::math::color::Rgb;
 use crate::store::SectionId;
 use bytemuck::{Pod, Zeroable};
 
@@ -102,8 +103,50 @@ pub struct LightRow {
     /// Sum of [`CHANGES`](LightRow::CHANGES), [`PLACED`](LightRow::PLACED) and
     /// [`FORCED`](LightRow::FORCED).
     pub class: u32,
-    /// Zero.
-    pub reserved: [u32; 2],
+    /// What it looks like.
+    pub look: LightLook,
+}
+
+/// What a light looks like (one that changes: in its first frame), for people who compare files. No
+/// tree depends on it, so it is not in the fingerprint.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
+#[repr(C)]
+pub struct LightLook {
+    /// 0 not told; else one of [`MESH`](LightLook::MESH), [`POINT`](LightLook::POINT),
+    /// [`SPOT`](LightLook::SPOT) and [`SPHERE`](LightLook::SPHERE).
+    pub kind: u16,
+    /// Its hue, linear Rec. 709 times 65535, the largest component 65535; zero if it is dark.
+    pub color: [u16; 3],
+}
+
+impl LightLook {
+    /// A mesh that emits.
+    pub const MESH: u16 = 1;
+    /// A point.
+    pub const POINT: u16 = 2;
+    /// A point that aims.
+    pub const SPOT: u16 = 3;
+    /// A sphere.
+    pub const SPHERE: u16 = 4;
+
+    /// A look, from a colour of any strength.
+    pub fn new(kind: u16, color: Rgb) -> LightLook {
+        let largest = color.max_element();
+        let hue = if largest > 0.0 { color / largest } else { Rgb::ZERO };
+        LightLook { kind, color: (hue * 65535.0).round().to_array().map(|c| c as u16) }
+    }
+
+    /// Its hue, linear Rec. 709, the largest component 1; `None` if it is dark or not told.
+    pub fn hue(&self) -> Option<Rgb> {
+        let hue = Rgb::from(self.color.map(|c| f32::from(c) / 65535.0));
+        (hue != Rgb::ZERO).then_some(hue)
+    }
+
+    /// Whether its fields have values that a writer gives them.
+    pub(super) fn is_sound(&self) -> bool {
+        let largest = self.color.iter().max();
+        self.kind <= LightLook::SPHERE && matches!(largest, Some(0 | 65535))
+    }
 }
 
 impl LightRow {

@@ -4,7 +4,9 @@ use super::base::{Base, Leaf};
 use super::builder::build_tree;
 use super::group::{Group, WIDTH};
 use super::node::{Link, Node};
-use super::records::{self, FrameRow, InstanceRow, LightRow, NO_TREE, TreeKind, TreeRow};
+use super::records::{
+    self, FrameRow, InstanceRow, LightLook, LightRow, NO_TREE, TreeKind, TreeRow,
+};
 use crate::bounds::LightBounds;
 use crate::math::Similarity;
 use crate::store::{AlignedBytes, ContainerWriter};
@@ -22,6 +24,8 @@ pub struct LightSummary {
     pub energy: f32,
     /// Sum of [`LightRow::CHANGES`], [`LightRow::PLACED`] and [`LightRow::FORCED`].
     pub class: u32,
+    /// What it looks like.
+    pub look: LightLook,
 }
 
 /// Builds the trees of a shot, one after the other, and writes them down.
@@ -183,7 +187,7 @@ impl<'a> LightTreeWriter<'a> {
             path_length: light.path.len() as u32,
             energy: light.energy,
             class: light.class,
-            reserved: [0; 2],
+            look: light.look,
         });
         self.emitter_count += light.emitter_count;
         self.paths.extend_from_slice(light.path.as_bytes());

@@ -30,7 +30,7 @@ impl Contributions {
     /// emitter, and with `visibility` only if a ray to its middle finds it.
     pub fn at(integrator: &Integrator, vertex: &Vertex, visibility: bool) -> Contributions {
         let emitters = integrator.picker.tree().unforced_count();
-        let of = |light| contribution(integrator, vertex, light, visibility);
+        let of = |light| contribution(integrator, vertex, light, visibility, POINTS_ALONG);
         Contributions {
             of_emitter: (0..emitters).map(|emitter| of(Picked::Emitter(emitter))).collect(),
             beside: (0..integrator.infinite.len() as u32)
@@ -74,11 +74,23 @@ impl Contributions {
     }
 }
 
+/// Luminance that a vertex reflects of a light, from the middles of a square lattice over it.
+pub fn reflected(
+    integrator: &Integrator,
+    vertex: &Vertex,
+    light: Picked,
+    visibility: bool,
+    points_along: u32,
+) -> f32 {
+    contribution(integrator, vertex, light, visibility, points_along).luminance
+}
+
 fn contribution(
     integrator: &Integrator,
     vertex: &Vertex,
     light: Picked,
     visibility: bool,
+    points_along: u32,
 ) -> Contribution {
     let point = vertex.receiver.point;
     let at = |u: Vec2| {
@@ -94,11 +106,11 @@ fn contribution(
         };
         Some((value, found))
     };
-    let step = |i: u32| (i as f32 + 0.5) / POINTS_ALONG as f32;
-    let points = POINTS_ALONG * POINTS_ALONG;
+    let step = |i: u32| (i as f32 + 0.5) / points_along as f32;
+    let points = points_along * points_along;
     let (mut sum, mut middle) = (Contribution::default(), None);
     for i in 0..points {
-        let u = Vec2::new(step(i % POINTS_ALONG), step(i / POINTS_ALONG));
+        let u = Vec2::new(step(i % points_along), step(i / points_along));
         let Some((value, found)) = at(u) else { continue };
         if found.pdf.is_none() {
             (sum, middle) = (value, Some(found));

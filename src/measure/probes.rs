@@ -9,7 +9,7 @@
 use super::contributions::{Contributions, shares};
 use crate::light_tree::NoSuchFrame;
 use crate::math::random::{Sampler, hash};
-use crate::render::path::Integrator;
+use crate::render::path::{Integrator, Vertex};
 use crate::render::picker::{LightPicker, PickScratch, Wanted};
 use crate::render::{LightStrategy, RenderDelegate, RenderSettings, SplitBy};
 use rayon::prelude::*;
@@ -120,15 +120,20 @@ fn report(integrator: &Integrator, options: &ProbeOptions) -> ProbeReport {
     }
 }
 
-/// One point: at the first hit of a path, or, every other one, after a bounce.
-fn probe(integrator: &Integrator, number: u32, options: &ProbeOptions) -> Option<Probe> {
-    let seed = hash(options.seed, number);
+/// A point that camera paths visit, one of so many: at the first hit of a path, or, every other one,
+/// after a bounce. `None` if the path hits nothing that reflects.
+pub fn visited(integrator: &Integrator, number: u32, of: u32, seed: u32) -> Option<Vertex> {
     // Spread over the picture by a lattice of rank 1.
     let (width, height) = (integrator.settings.width, integrator.settings.height);
-    let x = (number as f32 + 0.5) / options.probes as f32 * width as f32;
+    let x = (number as f32 + 0.5) / of as f32 * width as f32;
     let y = (f64::from(number) * 0.618_033_988_749_895).fract() as f32 * height as f32;
     let (x, y) = ((x as u32).min(width - 1), (y as u32).min(height - 1));
-    let vertex = integrator.probe(x, y, seed, number % 2)?;
+    integrator.probe(x, y, hash(seed, number), number % 2)
+}
+
+fn probe(integrator: &Integrator, number: u32, options: &ProbeOptions) -> Option<Probe> {
+    let seed = hash(options.seed, number);
+    let vertex = visited(integrator, number, options.probes, options.seed)?;
     let contributions = Contributions::at(integrator, &vertex, options.visibility);
     let sum = contributions.sum();
     let wanted = vertex.wanted(Some(&mut Sampler::new(seed, 1)));

@@ -10,6 +10,7 @@ mod content;
 mod forced;
 mod frames;
 mod fresh;
+mod look;
 mod survey;
 
 pub use build::{BuildOptions, Rebuilt, build_tree, rebuild_tree};

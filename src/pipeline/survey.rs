@@ -1,8 +1,9 @@
 //! What a tree depends on: the bounds of all emitters in all frames, and their fingerprints.
 
+use super::look::looks;
 use crate::bounds::LightBounds;
 use crate::emitter::{Emitters, LightEntry, LightOverflow, LightSource, PosedEmitters};
-use crate::light_tree::{ALGORITHM_VERSION, LightRow, LightSummary};
+use crate::light_tree::{ALGORITHM_VERSION, LightLook, LightRow, LightSummary};
 use crate::math::Similarity;
 use crate::scene::{Pose, Scene};
 use rayon::prelude::*;
@@ -77,7 +78,13 @@ pub fn survey(scene: &Scene, emitters: &Emitters, frames: &[i32]) -> Result<Surv
         .collect::<Result<Vec<_>, LightOverflow>>()?;
     let shared = surveyor.shared;
     check_total(emitters, &shared, &still, &frames)?;
-    let lights = summaries(emitters, &shared, &still, &frames);
+    // What changes looks as it does in the first frame.
+    let pose = match frames.first() {
+        Some((frame, _)) => scene.pose_at(scene.timeline.seconds_at(f64::from(*frame))),
+        None => pose,
+    };
+    let looks = looks(&PosedEmitters { scene, emitters, pose: &pose });
+    let lights = summaries(emitters, &looks, &shared, &still, &frames);
     let fingerprint = whole(&lights, &frames);
     Ok(Survey { shared, still, frames, lights, fingerprint })
 }
@@ -192,6 +199,7 @@ fn check_total(
 
 fn summaries(
     emitters: &Emitters,
+    looks: &[LightLook],
     shared: &[SharedBounds],
     still: &Group,
     frames: &[(i32, Group)],
@@ -236,6 +244,7 @@ fn summaries(
             class: bit(light.forced, LightRow::FORCED)
                 + bit(light.changes(), LightRow::CHANGES)
                 + bit(light.in_own_space || light.forced, LightRow::PLACED),
+            look: looks[row],
         }
     };
     emitters.lights().par_iter().enumerate().map(summary).collect()

@@ -7,7 +7,7 @@ mod lights;
 use candelabra::bounds::{Aabb, Cone, LightBounds};
 use candelabra::emitter::Emitters;
 use candelabra::light_tree::{
-    Glossy, LightSummary, LightTree, LightTreeWriter, Link, Lobes, Receiver, TreeKind,
+    Glossy, LightLook, LightSummary, LightTree, LightTreeWriter, Link, Lobes, Receiver, TreeKind,
 };
 use candelabra::math::random::{hash, widen};
 use candelabra::pipeline::{self, BuildOptions, open_tree};
@@ -53,6 +53,7 @@ fn build(bounds: &[LightBounds]) -> AlignedBytes {
         emitter_count: bounds.len() as u32,
         energy: 1.0,
         class: 0,
+        look: LightLook::default(),
     });
     writer.finish("{}", [0; 32])
 }

@@ -3,7 +3,9 @@
 mod build;
 mod disk;
 mod files;
+mod inspect;
 mod lights;
+mod pages;
 mod render;
 mod resume;
 mod trees;

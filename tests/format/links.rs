@@ -4,7 +4,7 @@ use crate::bytes::Parts;
 use crate::probe::{probe, repaired};
 use candelabra::bounds::{Aabb, Cone, LightBounds};
 use candelabra::light_tree::{
-    LightSummary, LightTree, LightTreeWriter, Link, Receiver, Splitting, TreeKind,
+    LightLook, LightSummary, LightTree, LightTreeWriter, Link, Receiver, Splitting, TreeKind,
 };
 use candelabra::store::AlignedBytes;
 use glam::Vec3;
@@ -30,6 +30,7 @@ fn points(count: u32) -> Parts {
         emitter_count: count,
         energy: count as f32,
         class: 0,
+        look: LightLook::default(),
     });
     Parts::of(writer.finish("{}", [0; 32]).as_ref())
 }

@@ -3,7 +3,9 @@
 
 use crate::support::{Tree, direction, emitter, emitters, position};
 use candelabra::bounds::{Aabb, Cone, LightBounds};
-use candelabra::light_tree::{LightRow, LightSummary, LightTree, LightTreeWriter, Link, TreeKind};
+use candelabra::light_tree::{
+    LightLook, LightRow, LightSummary, LightTree, LightTreeWriter, Link, TreeKind,
+};
 use candelabra::math::Similarity;
 use glam::{Affine3A, Mat3, Quat, Vec3};
 use proptest::prelude::*;
@@ -186,7 +188,14 @@ impl City {
 }
 
 fn summary(path: String, emitter_count: u32, class: u32) -> LightSummary {
-    LightSummary { path, fingerprint: [0; 32], emitter_count, energy: 1.0, class }
+    LightSummary {
+        path,
+        fingerprint: [0; 32],
+        emitter_count,
+        energy: 1.0,
+        class,
+        look: LightLook::default(),
+    }
 }
 
 /// Bounds of a space of its own as they are in world space, as `pipeline::build` has them.

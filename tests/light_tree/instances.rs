@@ -67,6 +67,19 @@ proptest! {
     }
 
     #[test]
+    fn one_walk_tells_every_probability(city in city(), viewer in any_viewer()) {
+        with_frame(&city.tree(), 1, |frame| for_viewer!(viewer, |v| {
+            let mut told = vec![0.0; frame.unforced_count() as usize];
+            frame.for_each_probability(&v, |emitter, probability| told[emitter as usize] += probability);
+            for (emitter, told) in (0..).zip(told) {
+                let probability = frame.probability(&v, emitter);
+                prop_assert!((told - probability).abs() <= 1e-12 * probability, "{emitter}: {told}");
+            }
+            Ok(())
+        }))?;
+    }
+
+    #[test]
     fn a_pick_has_the_probability_it_says_through_instances(
         city in city(), viewer in any_viewer()
     ) {

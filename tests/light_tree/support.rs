@@ -2,8 +2,8 @@
 
 use candelabra::bounds::{Aabb, Cone, LightBounds};
 use candelabra::light_tree::{
-    DistanceOnly, FrameTree, Glossy, LightSummary, LightTree, LightTreeWriter, Link, Lobes, Node,
-    Receiver, Segment, Splitting, TreeKind, Viewer,
+    DistanceOnly, FrameTree, Glossy, LightLook, LightSummary, LightTree, LightTreeWriter, Link,
+    Lobes, Node, Receiver, Segment, Splitting, TreeKind, Viewer,
 };
 use candelabra::store::AlignedBytes;
 use glam::Vec3;
@@ -22,6 +22,7 @@ pub fn tree_over(bounds: &[LightBounds]) -> Tree {
         emitter_count: bounds.len() as u32,
         energy: bounds.iter().map(|b| b.energy).sum(),
         class: 0,
+        look: LightLook::default(),
     });
     LightTree::open(writer.finish("{}", [2; 32])).expect("a tree just written opens")
 }

@@ -1,120 +1,159 @@
 //! `candelabra inspect`: what is in a scene or in a tree file.
 
-use anyhow::Result;
+use crate::page;
+use anyhow::{Context, Result};
 use candelabra::emitter::Emitters;
-use candelabra::light_tree::LightRow;
-use candelabra::pipeline;
-use candelabra::scene::{Requirements, Scene};
+use candelabra::inspect::{self, SceneReport, TreeReport};
+use candelabra::light_tree::LightTree;
+use candelabra::page::Short;
+use candelabra::pipeline::{self, BuildOptions};
 use clap::Args;
+use serde::Serialize;
 use std::io::Write;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 #[derive(Args)]
 pub struct Arguments {
     /// A scene (.gltf, .glb, .obj) or a tree file (.ltree)
     file: PathBuf,
+    /// Name so many of a tree's heaviest lights
+    #[arg(long, value_name = "COUNT", default_value_t = 10)]
+    lights: usize,
+    /// Print JSON
+    #[arg(long, group = "form")]
+    json: bool,
+    /// Print the top of the tree as a graph for Graphviz (`| dot -Tsvg`); a scene's tree is built for it
+    #[arg(long, group = "form")]
+    dot: bool,
+    /// How far down the graph goes
+    #[arg(long, requires = "dot", default_value_t = 2)]
+    depth: usize,
+    /// Write a page with pictures of the lights and the clusters; a scene's tree is built for it
+    #[arg(long, value_name = "FILE", group = "form")]
+    html: Option<PathBuf>,
 }
-
-/// Lights that are named.
-const HEAVIEST: usize = 10;
 
 pub fn run(arguments: &Arguments) -> Result<()> {
-    let mut out = std::io::stdout().lock();
     if arguments.file.extension().is_some_and(|e| e.eq_ignore_ascii_case("ltree")) {
-        inspect_tree(&mut out, &arguments.file)
+        let tree = pipeline::open_tree(&arguments.file, true)?;
+        show_tree(arguments, &tree, None)
     } else {
-        inspect_scene(&mut out, &pipeline::load_scene(&arguments.file)?)
+        show_scene(arguments)
     }
 }
 
-fn inspect_scene(out: &mut impl Write, scene: &Scene) -> Result<()> {
-    let triangles_of = |mesh: u32| scene.meshes[mesh as usize].triangles.len();
-    let stored: usize = scene.meshes.iter().map(|mesh| mesh.triangles.len()).sum();
-    let placed: usize = scene.instances.iter().map(|i| triangles_of(i.mesh)).sum();
-    writeln!(out, "{}", scene.source.display())?;
-    writeln!(out, "  nodes       {}", scene.nodes.len())?;
-    writeln!(out, "  meshes      {} with {stored} triangles", scene.meshes.len())?;
-    writeln!(out, "  instances   {} with {placed} triangles", scene.instances.len())?;
-    writeln!(out, "  materials   {}", scene.materials.len())?;
-    for (i, camera) in scene.cameras.iter().enumerate() {
-        let path = &scene.nodes[camera.node as usize].path;
-        writeln!(out, "  camera {i}    {path}, {:.1} degrees high", camera.yfov_rad.to_degrees())?;
+fn show_scene(arguments: &Arguments) -> Result<()> {
+    let scene = pipeline::load_scene(&arguments.file)?;
+    let emitters = Emitters::collect(&scene);
+    let report = SceneReport::of(&scene, &emitters);
+    if arguments.json {
+        return print_json(&report);
     }
-    let frames = pipeline::frames_of(scene);
-    if let ([first, .., last], rate) = (frames.as_slice(), scene.timeline.frames_per_second) {
-        writeln!(out, "  frames      {first} to {last} at {rate} a second")?;
+    if !arguments.dot && arguments.html.is_none() {
+        return print_scene(&mut std::io::stdout().lock(), &report);
     }
-    let emitters = Emitters::collect(scene);
+    let survey = pipeline::survey(&scene, &emitters, &pipeline::frames_of(&scene))
+        .with_context(|| arguments.file.display().to_string())?;
+    let options =
+        BuildOptions { program: concat!("candelabra ", env!("CARGO_PKG_VERSION")).into() };
+    let tree = LightTree::open(pipeline::build_tree(&survey, &options))?;
+    show_tree(arguments, &tree, Some(&report))
+}
+
+fn show_tree<D: AsRef<[u8]>>(
+    arguments: &Arguments,
+    tree: &LightTree<D>,
+    scene: Option<&SceneReport>,
+) -> Result<()> {
+    let mut out = std::io::stdout().lock();
+    let file = arguments.file.display().to_string();
+    let report = TreeReport::of(tree, &file, arguments.lights);
+    if arguments.json {
+        return print_json(&report);
+    }
+    if arguments.dot {
+        out.write_all(inspect::dot(tree, arguments.depth).as_bytes())?;
+        return Ok(());
+    }
+    let Some(page) = &arguments.html else { return print_tree(&mut out, &report) };
+    page::write(page, &inspect::html(tree, &report, scene), &[&arguments.file])
+}
+
+fn print_json(report: &impl Serialize) -> Result<()> {
+    writeln!(std::io::stdout().lock(), "{}", serde_json::to_string_pretty(report)?)?;
+    Ok(())
+}
+
+fn print_scene(out: &mut impl Write, report: &SceneReport) -> Result<()> {
+    writeln!(out, "{}", report.file)?;
+    writeln!(out, "  nodes       {}", report.nodes)?;
+    writeln!(out, "  meshes      {} with {} triangles", report.meshes, report.stored_triangles)?;
+    writeln!(out, "  instances   {} with {} triangles", report.instances, report.placed_triangles)?;
+    writeln!(out, "  materials   {}", report.materials)?;
+    for (i, camera) in report.cameras.iter().enumerate() {
+        writeln!(out, "  camera {i}    {}, {:.1} degrees high", camera.path, camera.height_deg)?;
+    }
+    if let Some(frames) = report.frames {
+        let rate = report.frames_per_second;
+        writeln!(out, "  frames      {} to {} at {rate} a second", frames.first, frames.last)?;
+    }
     writeln!(
         out,
         "  emitters    {} of {} lights; {} change",
-        emitters.len(),
-        emitters.lights().len(),
-        emitters.changing_count()
+        report.emitters, report.lights, report.changing
     )?;
-    print_requirements(out, &scene.requirements())?;
-    for note in &scene.notes {
+    writeln!(out, "  requires")?;
+    for (count, feature) in report.features() {
+        writeln!(out, "    {count:>8}  {feature}")?;
+    }
+    for note in &report.notes {
         writeln!(out, "  note: {note}")?;
     }
     Ok(())
 }
 
-/// The features that the scene switches on.
-fn print_requirements(out: &mut impl Write, needs: &Requirements) -> Result<()> {
-    let features = [
-        (needs.mesh_lights, "mesh lights"),
-        (needs.textured_mesh_lights, "textured mesh lights"),
-        (needs.shaped_lights, "emission profiles"),
-        (needs.varying_lights, "lights that vary"),
-        (needs.spheres, "sphere lights"),
-        (needs.points, "point lights"),
-        (needs.spots, "spot lights"),
-        (needs.suns, "suns"),
-        (needs.domes, "domes"),
-        (needs.shared_meshes, "meshes shared by instances"),
-        (needs.animated_nodes, "animated nodes"),
-        (needs.textures, "textures"),
-        (needs.cutouts, "cut-out materials"),
-        (needs.normal_maps, "normal maps"),
-        (needs.fog, "fog"),
-        (needs.lenses, "camera lenses"),
-    ];
-    writeln!(out, "  requires")?;
-    for (count, feature) in features.into_iter().filter(|(count, _)| *count > 0) {
-        writeln!(out, "    {count:>8}  {feature}")?;
+fn print_tree(out: &mut impl Write, report: &TreeReport) -> Result<()> {
+    let TreeReport { file, bytes, bytes_per_emitter, meta, .. } = report;
+    writeln!(out, "{file}: sound")?;
+    writeln!(out, "  {bytes} bytes, {bytes_per_emitter:.1} an emitter; {meta}")?;
+    for section in &report.sections {
+        let need = if section.required { "required" } else { "optional" };
+        writeln!(out, "  section {}  {:>12} bytes  {need}", section.id, section.bytes)?;
     }
-    Ok(())
-}
-
-fn inspect_tree(out: &mut impl Write, path: &Path) -> Result<()> {
-    let tree = pipeline::open_tree(path, true)?;
-    let emitters = tree.emitter_count();
-    let each = tree.byte_length() as f64 / emitters.max(1) as f64;
-    writeln!(out, "{}: sound", path.display())?;
-    writeln!(out, "  {} bytes, {each:.1} an emitter; {}", tree.byte_length(), tree.meta())?;
-    for section in tree.sections() {
-        let need = if section.required != 0 { "required" } else { "optional" };
-        writeln!(out, "  section {}  {:>12} bytes  {need}", section.id, section.length)?;
-    }
-    let count = |class| tree.lights().iter().filter(|light| light.is(class)).count();
     writeln!(
         out,
-        "  {emitters} emitters of {} lights, {} lights change, {} are forced; {} trees, {} instances, {} frames",
-        tree.lights().len(),
-        count(LightRow::CHANGES),
-        count(LightRow::FORCED),
-        tree.trees().len(),
-        tree.instances().len(),
-        tree.frames().len()
+        "  {} emitters of {} lights, {} lights change, {} are forced; {} trees, {} instances, {} frames",
+        report.emitters,
+        report.lights,
+        report.changing,
+        report.forced,
+        report.trees.iter().map(|shape| shape.trees).sum::<usize>(),
+        report.instances,
+        report.frames.map_or(0, |frames| frames.count)
     )?;
-    let total: f64 = tree.lights().iter().map(|light| f64::from(light.energy)).sum();
-    let mut heaviest: Vec<_> = tree.lights().iter().collect();
-    heaviest.sort_by(|a, b| b.energy.total_cmp(&a.energy));
+    writeln!(
+        out,
+        "  {:<8} {:>6} {:>10} {:>10} {:>7} {:>8} {:>11} {:>7}",
+        "trees", "", "leaves", "groups", "fill", "deepest", "mean depth", "cost"
+    )?;
+    for shape in &report.trees {
+        writeln!(
+            out,
+            "  {:<8} {:>6} {:>10} {:>10} {:>5.1} % {:>8} {:>11.2} {:>7.2}",
+            shape.kind,
+            shape.trees,
+            shape.leaves,
+            shape.groups,
+            100.0 * shape.fill,
+            shape.deepest,
+            shape.mean_depth,
+            shape.cost
+        )?;
+    }
     writeln!(out, "  heaviest lights")?;
-    for light in heaviest.into_iter().take(HEAVIEST) {
-        let share = 100.0 * f64::from(light.energy) / total;
-        let count = light.emitter_count;
-        writeln!(out, "    {share:>6.2} %  {count:>8} emitters  {}", tree.light_path(light))?;
+    for light in &report.heaviest {
+        let share = Short(100.0 * light.share).to_string();
+        writeln!(out, "    {share:>9} %  {:>8} emitters  {}", light.emitters, light.path)?;
     }
     Ok(())
 }

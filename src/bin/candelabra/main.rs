@@ -1,8 +1,10 @@
 //! `candelabra`: builds light trees and looks into them.
 
 mod build;
+mod diff;
 mod inspect;
 mod measure;
+mod page;
 mod race;
 mod shot;
 mod verify;
@@ -22,6 +24,8 @@ struct Arguments {
 enum Command {
     /// Build the light trees of a scene and write them to a file
     Build(build::Arguments),
+    /// Compare two versions of a scene, or their trees: which lights changed, and by how much
+    Diff(diff::Arguments),
     /// Print what is in a scene or in a tree file, and what the scene requires
     Inspect(inspect::Arguments),
     /// Compute exactly how far off each strategy of picking lights is, at points of a picture
@@ -33,13 +37,15 @@ enum Command {
 }
 
 fn main() -> ExitCode {
+    let command = Arguments::parse().command;
     let done = |()| ExitCode::SUCCESS;
-    let outcome = match Arguments::parse().command {
-        Command::Build(arguments) => build::run(&arguments).map(done),
-        Command::Inspect(arguments) => inspect::run(&arguments).map(done),
-        Command::Measure(arguments) => measure::run(&arguments).map(done),
-        Command::Race(arguments) => race::run(&arguments).map(done),
-        Command::Verify(arguments) => verify::run(&arguments),
+    let outcome = match &command {
+        Command::Build(arguments) => build::run(arguments).map(done),
+        Command::Diff(arguments) => diff::run(arguments),
+        Command::Inspect(arguments) => inspect::run(arguments).map(done),
+        Command::Measure(arguments) => measure::run(arguments).map(done),
+        Command::Race(arguments) => race::run(arguments).map(done),
+        Command::Verify(arguments) => verify::run(arguments),
     };
     match outcome {
         Ok(code) => code,
@@ -47,7 +53,10 @@ fn main() -> ExitCode {
         Err(error) if is_closed_pipe(&error) => ExitCode::SUCCESS,
         Err(error) => {
             eprintln!("candelabra: {error:#}");
-            ExitCode::FAILURE
+            match command {
+                Command::Diff(_) => diff::TROUBLE.into(),
+                _ => ExitCode::FAILURE,
+            }
         }
     }
 }

@@ -62,7 +62,7 @@ impl Bin {
         if self.count == 0 {
             return 0.0;
         }
-        self.energy * area_measure(&self.aabb) * f64::from(self.orientation_measure())
+        self.energy * self.aabb.measure() * f64::from(self.orientation_measure())
     }
 
     /// [`Cone::measure`] of the estimated cone.
@@ -93,15 +93,6 @@ fn acos_of_positive(x: f32) -> f32 {
     (1.0 - x).max(0.0).sqrt()
         * (1.570_728_8 + x * (-0.212_114_4 + x * (0.074_261 - 0.018_729_3 * x)))
 }
-
-/// Surface of a box plus a share of its squared diagonal: a measure that scales like an area and
-/// still tells a short line of points from a long one, and points on a line from a single point.
-fn area_measure(aabb: &Aabb) -> f64 {
-    let e = aabb.extent().as_dvec3();
-    2.0 * (e.x * e.y + e.y * e.z + e.z * e.x) + DIAGONAL_SHARE * e.length_squared()
-}
-
-const DIAGONAL_SHARE: f64 = 0.25;
 
 #[cfg(test)]
 mod tests {

@@ -16,8 +16,8 @@ impl<D: AsRef<[u8]> + Sync> LightTree<D> {
             check(follows, rules::EMITTERS_FOLLOW, row)?;
             next_emitter += u64::from(light.emitter_count);
             check(matches!(light.class, 0..=3 | 5 | 7), rules::CLASS_IS_KNOWN, row)?;
-            let is_spare = light.reserved == [0; 2] || self.is_of_later_version();
-            check(is_spare, rules::LIGHT_SPARE_IS_ZERO, row)?;
+            let is_known = light.look.is_sound() || self.is_of_later_version();
+            check(is_known, rules::LOOK_IS_KNOWN, row)?;
             let is_number = light.energy.is_finite() && light.energy >= 0.0;
             check(is_number, rules::LIGHT_ENERGY_IS_A_NUMBER, row)?;
             let now = (light.class, self.light_path(light));

@@ -70,7 +70,7 @@ rules! {
     records::LIGHTS, OF_LIGHTS:
     EMITTERS_FOLLOW = "its emitters follow those of the light before it, from 0 on";
     CLASS_IS_KNOWN = "its class is 0, 1, 2, 3, 5 or 7";
-    LIGHT_SPARE_IS_ZERO = "its spare bytes are 0";
+    LOOK_IS_KNOWN = "its kind is 0 to 4, and the largest part of its colour 65535, or 0";
     LIGHT_ENERGY_IS_A_NUMBER = "its energy is finite and not negative";
     PATH_IS_TEXT = "its path is UTF-8 inside PATH, and not empty";
     LIGHTS_ARE_IN_ORDER = "lights are in order of class and then of path, no two alike";

@@ -1,7 +1,8 @@
 //! Everything that can be asked of a tree file, asked of bytes that nobody verified.
 
 use candelabra::light_tree::{
-    FrameTree, Glossy, LightTree, Picked, Receiver, Scratch, Segment, SplitTest, Splitting, Viewer,
+    FrameTree, Glossy, LightTree, Lobes, Picked, Receiver, Scratch, Segment, SplitTest, Splitting,
+    Viewer,
 };
 use candelabra::store::AlignedBytes;
 use glam::Vec3;
@@ -69,7 +70,8 @@ fn ask_all(frame: &FrameTree, is_sound: bool) {
     let receiver = Receiver { point: middle + Vec3::new(1.0, 2.0, -0.5), normal: Vec3::Y };
     ask(frame, &receiver, is_sound);
     let receiver = Receiver { point: middle, ..receiver };
-    ask(frame, &Glossy { receiver, toward: Vec3::Z, alpha: 0.2, specular: 0.5 }, is_sound);
+    let lobes = Lobes { diffuse: 0.5, at_normal: 0.04, toward_grazing: 0.5, alpha: 0.2 };
+    ask(frame, &Glossy { receiver, to_eye: Vec3::Y, lobes, toward: Vec3::Z }, is_sound);
     ask(frame, &Segment { origin: Vec3::ZERO, direction: Vec3::X, length: 2.0 }, is_sound);
 }
 

@@ -1,0 +1,94 @@
+//! `candelabra diff`: what changed between two versions of a scene, and by how much.
+
+use crate::page;
+use anyhow::{Result, bail};
+use candelabra::diff::{DiffOptions, Side, SideError, Text, compare, compare_folders, html};
+use clap::Args;
+use std::fmt::Display;
+use std::io::{self, BufWriter, StdoutLock, Write};
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+/// Compares the lights of two versions: tree files (.ltree), scenes (.gltf, .glb, .obj), or one of
+/// each; or all shots of two folders, matched by name.
+///
+/// Ends with 0 if they are the same, 1 if they differ and 2 if they cannot be compared.
+#[derive(Args)]
+pub struct Arguments {
+    /// The version before
+    before: PathBuf,
+    /// The version after
+    after: PathBuf,
+    /// List every light that differs, and not only those that matter most to the light
+    #[arg(long)]
+    all: bool,
+    /// Print JSON (schema candelabra.diff, version 1), which lists them all
+    #[arg(long)]
+    json: bool,
+    /// Write a page too, with pictures of the lights and of what the camera sees; not of folders
+    #[arg(long, value_name = "FILE")]
+    html: Option<PathBuf>,
+    /// Threads; as many as there are cores if not given
+    #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024))]
+    threads: Option<u16>,
+}
+
+/// Lights that are listed, of each shot.
+const LISTED: usize = 20;
+const DIFFERENT: u8 = 1;
+/// What every failure of this command ends with, as those of `diff` do.
+pub const TROUBLE: u8 = 2;
+
+pub fn run(arguments: &Arguments) -> Result<ExitCode> {
+    if let Some(threads) = arguments.threads {
+        rayon::ThreadPoolBuilder::new().num_threads(threads.into()).build_global()?;
+    }
+    let Arguments { before, after, .. } = arguments;
+    match [before, after].map(|path| path.is_dir()) {
+        [false, false] => {
+            let (before, after) = rayon::join(|| Side::open(before), || Side::open(after));
+            let (before, after) = (before?, after?);
+            let for_page = arguments.html.is_some();
+            let options = DiffOptions { unchanged: for_page, heat: for_page };
+            let diff = compare(&before, &after, &options)?;
+            if let Some(page) = &arguments.html {
+                page::write(page, &html(&diff), &[&arguments.before, &arguments.after])?;
+            }
+            print(arguments, |out| diff.write_json(out), |most| Text { of: &diff, most })?;
+            Ok(if diff.is_same() { ExitCode::SUCCESS } else { DIFFERENT.into() })
+        }
+        [true, true] if arguments.html.is_some() => {
+            bail!("{}: a page compares two files, and these are folders", before.display())
+        }
+        [true, true] => {
+            let diff = compare_folders(before, after)?;
+            print(arguments, |out| diff.write_json(out), |most| Text { of: &diff, most })?;
+            Ok(match (diff.has_trouble(), diff.is_same()) {
+                (true, _) => TROUBLE.into(),
+                (false, true) => ExitCode::SUCCESS,
+                (false, false) => DIFFERENT.into(),
+            })
+        }
+        [is_folder, _] => {
+            let (folder, file) = if is_folder { (before, after) } else { (after, before) };
+            bail!(SideError::FolderAndFile { folder: folder.clone(), file: file.clone() })
+        }
+    }
+}
+
+fn print<T: Display>(
+    arguments: &Arguments,
+    json: impl FnOnce(&mut BufWriter<StdoutLock>) -> io::Result<()>,
+    text: impl FnOnce(usize) -> T,
+) -> io::Result<()> {
+    let mut out = BufWriter::new(io::stdout().lock());
+    let written = match arguments.json {
+        true => json(&mut out),
+        false => write!(out, "{}", text(if arguments.all { usize::MAX } else { LISTED })),
+    };
+    // A reader that has seen enough (`| head`) does not make the versions the same.
+    match written.and_then(|()| out.flush()) {
+        Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(()),
+        written => written,
+    }
+}

@@ -1,0 +1,137 @@
+//! One light that differs, and in what.
+
+use super::card::{Kind, LightCard};
+use serde::Serialize;
+
+/// What happened to a light.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Verb {
+    /// The version before does not have it.
+    Added,
+    /// The version after does not have it.
+    Removed,
+    /// It is not what it was.
+    Dirtied,
+    /// The same light under another path; perhaps carried along by a prim above it.
+    Renamed,
+}
+
+/// One light that differs. There is a card for each version that has it.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Change {
+    /// What happened to it.
+    pub verb: Verb,
+    /// How much it matters, `[0, 1]`: the larger of the share of all energy that it gained or lost
+    /// and the share of all picks, in the mean over the probes, that it gained or lost.
+    pub share: f64,
+    /// The light before.
+    pub before: Option<LightCard>,
+    /// The light after.
+    pub after: Option<LightCard>,
+    /// What differs; empty if it was added, removed, or renamed and nothing else.
+    pub differences: Vec<Difference>,
+}
+
+/// One thing in which a light differs, and by how much. At most one of each sort.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(tag = "aspect", rename_all = "snake_case")]
+pub enum Difference {
+    /// Where it is. Parts that cannot be told from a tree file, such as a turn of a light that shines
+    /// to all sides, are as if they had not changed.
+    Transform {
+        /// How far its middle moved, metres.
+        moved_m: f32,
+        /// By what angle it turned, degrees.
+        turned_deg: f32,
+        /// By how much it grew; 1 if not.
+        scaled: f32,
+    },
+    /// What it is made of. Where both numbers are the same, its shape differs in its own space.
+    Topology {
+        /// Emitters before.
+        before: u32,
+        /// Emitters after.
+        after: u32,
+    },
+    /// How strong it is, in the unit of [`LightCard::energy`].
+    Energy {
+        /// Before.
+        before: f32,
+        /// After.
+        after: f32,
+        /// `log2` of the ratio: 1 is twice as strong; `None` if either is dark.
+        stops: Option<f32>,
+    },
+    /// Its hue; see [`LightCard::color`].
+    Color {
+        /// Before.
+        before: Option<[f32; 3]>,
+        /// After.
+        after: Option<[f32; 3]>,
+    },
+    /// How far off its axis light leaves it.
+    Cone {
+        /// Half angle before, degrees.
+        before_deg: f32,
+        /// Half angle after, degrees.
+        after_deg: f32,
+    },
+    /// What kind of light it is.
+    Kind {
+        /// Before.
+        before: Option<Kind>,
+        /// After.
+        after: Option<Kind>,
+    },
+    /// Whether it is sampled at every point.
+    Forced {
+        /// Before.
+        before: bool,
+        /// After.
+        after: bool,
+    },
+    /// How far it reaches.
+    Range {
+        /// Metres before; `None` is physical.
+        before_m: Option<f32>,
+        /// Metres after; `None` is physical.
+        after_m: Option<f32>,
+    },
+    /// What it does in time.
+    OverTime {
+        /// Whether it changes before.
+        before: bool,
+        /// Whether it changes after.
+        after: bool,
+    },
+    /// How its light is spread: the texture of its emission, its profile within the cone, the shares
+    /// of its emitters. All that the other amounts do not tell.
+    Pattern,
+}
+
+impl Change {
+    /// The path by which it is known: after, if it is there then.
+    pub fn path(&self) -> &str {
+        let card = self.after.as_ref().or(self.before.as_ref());
+        card.map_or("", |card| &card.path)
+    }
+}
+
+impl Difference {
+    /// The word for it, as in the JSON.
+    pub fn aspect(&self) -> &'static str {
+        match self {
+            Difference::Transform { .. } => "transform",
+            Difference::Topology { .. } => "topology",
+            Difference::Energy { .. } => "energy",
+            Difference::Color { .. } => "color",
+            Difference::Cone { .. } => "cone",
+            Difference::Kind { .. } => "kind",
+            Difference::Forced { .. } => "forced",
+            Difference::Range { .. } => "range",
+            Difference::OverTime { .. } => "over_time",
+            Difference::Pattern => "pattern",
+        }
+    }
+}

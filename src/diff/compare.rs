@@ -1,0 +1,209 @@
+//! The comparison itself.
+
+use super::amounts::differences;
+use super::change::{Change, Verb};
+use super::describe::Describer;
+use super::heat;
+use super::light::{Light, Profile, Row};
+use super::pairs::{Half, Pair, Pairs};
+use super::picking::{PickingChange, Picks, picking_change};
+use super::probes::{box_around, probes};
+use super::side::{Side, SideError, Surveyed, TreeBytes};
+use super::totals::{Tally, Totals};
+use super::{Diff, SideName};
+use crate::light_tree::LightTree;
+use rayon::prelude::*;
+
+/// What a comparison is to find out besides what changed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct DiffOptions {
+    /// Where the lights stand that are the same: [`Diff::unchanged`].
+    pub unchanged: bool,
+    /// Where in the camera's view light changed: [`Diff::heat`].
+    pub heat: bool,
+}
+
+/// Compares two versions.
+///
+/// # Errors
+/// A scene with a light that no tree can hold.
+pub fn compare(before: &Side, after: &Side, options: &DiffOptions) -> Result<Diff, SideError> {
+    let surveyed = Surveyed::both(before, after)?;
+    let sides = [&surveyed[0], &surveyed[1]];
+    let names = [before, after].map(|side| side.name().clone());
+    let looks_closer = *options != DiffOptions::default();
+    if sides[0].has_rows_of(sides[1]) && !looks_closer {
+        return Ok(same(names, tally(&sides[0].lights())));
+    }
+    let [lights_before, lights_after] = comparable(sides);
+    let lights = [lights_before.as_slice(), lights_after.as_slice()];
+    let pairs = Pairs::of(sides, lights);
+    let tallies = lights.map(tally);
+    let is_same = sides[0].fingerprint() == sides[1].fingerprint() && pairs.changed.is_empty();
+    if is_same && !looks_closer {
+        return Ok(same(names, tallies[0]));
+    }
+    let (tree_before, tree_after) = rayon::join(|| sides[0].tree(), || sides[1].tree());
+    let trees = [&tree_before, &tree_after];
+    let (picking, moved) = compare_picking(sides, trees, lights, &pairs);
+    let describer = Describer::new(sides, trees);
+    let weigher = Weigher::new(trees, tallies, &moved);
+    let found = pairs.changed.par_iter().map(|pair| weigher.change(pair, &describer));
+    let mut changes: Vec<Change> = found.flatten().collect();
+    changes.par_sort_by(|a, b| {
+        (b.share.total_cmp(&a.share))
+            .then_with(|| strength(b).total_cmp(&strength(a)))
+            .then_with(|| a.path().cmp(b.path()))
+    });
+    let mark = |&row: &u32| describer.mark(&lights[1][row as usize]);
+    let marked = if options.unchanged { pairs.unchanged.as_slice() } else { &[] };
+    let heat = match sides.map(Surveyed::scene) {
+        [Some(before), Some(after)] if options.heat => heat::map([before, after], trees),
+        _ => None,
+    };
+    let [before, after] = names;
+    Ok(Diff {
+        before,
+        after,
+        totals: totals(tallies, &changes, pairs.count),
+        picking,
+        changes,
+        unchanged: marked.par_iter().filter_map(mark).collect(),
+        heat,
+    })
+}
+
+/// Nothing differs.
+fn same([before, after]: [SideName; 2], tally: Tally) -> Diff {
+    Diff {
+        before,
+        after,
+        totals: totals([tally; 2], &[], tally.lights),
+        picking: None,
+        changes: Vec::new(),
+        unchanged: Vec::new(),
+        heat: None,
+    }
+}
+
+/// What both versions tell: a tree knows neither lights at infinity nor how lights are spread.
+fn comparable<'a>(sides: [&'a Surveyed; 2]) -> [Vec<Light<'a>>; 2] {
+    let both_scenes = sides.iter().all(|side| side.scene().is_some());
+    sides.map(|side| {
+        let mut lights = side.lights();
+        if !both_scenes {
+            lights.retain(|light| matches!(light.row, Row::Near(_)));
+            lights.iter_mut().for_each(|light| light.profile = Profile::default());
+        }
+        lights
+    })
+}
+
+fn tally(lights: &[Light]) -> Tally {
+    let sum = |infinite: bool| {
+        let of = lights.iter().filter(|light| matches!(light.row, Row::Infinite(_)) == infinite);
+        of.map(|light| f64::from(light.energy)).sum()
+    };
+    Tally {
+        lights: lights.len(),
+        emitters: lights.iter().map(|light| light.emitters as usize).sum(),
+        energy_cd: sum(false),
+        illuminance_lux: sum(true),
+    }
+}
+
+/// `lights` of both versions in all, each counted once.
+fn totals([before, after]: [Tally; 2], changes: &[Change], lights: usize) -> Totals {
+    let count = |verb| changes.iter().filter(|change| change.verb == verb).count();
+    Totals {
+        before,
+        after,
+        added: count(Verb::Added),
+        removed: count(Verb::Removed),
+        dirtied: count(Verb::Dirtied),
+        renamed: count(Verb::Renamed),
+        unchanged: lights - changes.len(),
+    }
+}
+
+fn compare_picking(
+    sides: [&Surveyed; 2],
+    trees: [&LightTree<TreeBytes>; 2],
+    lights: [&[Light]; 2],
+    pairs: &Pairs,
+) -> (Option<PickingChange>, Vec<f64>) {
+    if lights.iter().all(|lights| lights.is_empty()) {
+        return (None, Vec::new());
+    }
+    let scenes = sides.map(Surveyed::scene);
+    let (places, probes) = probes(scenes, trees);
+    let before: Vec<u32> = (0..lights[0].len() as u32).collect();
+    let tables = trees.map(LightTree::leaf_table);
+    let both_scenes = scenes.iter().all(Option::is_some);
+    let beside = scenes.map(|scene| scene.filter(|_| both_scenes));
+    let picks = [
+        Picks::new(trees[0], &tables[0], beside[0], &before),
+        Picks::new(trees[1], &tables[1], beside[1], &pairs.number_of_after),
+    ];
+    let (change, moved) = picking_change([&picks[0], &picks[1]], pairs.count, places, &probes);
+    (Some(change), moved)
+}
+
+/// The strength that ties are told by.
+fn strength(change: &Change) -> f32 {
+    let cards = [&change.before, &change.after].into_iter().flatten();
+    cards.map(|card| card.energy).fold(0.0, f32::max)
+}
+
+/// Tells how much a change matters.
+struct Weigher<'a> {
+    /// Energy of the stronger version.
+    total: f64,
+    /// What turns the illuminance of a light at infinity into the energy of a point light that gives
+    /// as much from the edge of the lights' box, m2.
+    radius2: f64,
+    /// By number of the light, the share of picks that it gained or lost.
+    moved: &'a [f64],
+}
+
+impl<'a> Weigher<'a> {
+    fn new(
+        trees: [&LightTree<TreeBytes>; 2],
+        tallies: [Tally; 2],
+        moved: &'a [f64],
+    ) -> Weigher<'a> {
+        let radius2 = f64::from((0.5 * box_around(trees).extent()).length_squared());
+        let radius2 = if radius2 > 0.0 { radius2 } else { 1.0 };
+        let energies = tallies.map(|t| t.energy_cd + t.illuminance_lux * radius2);
+        Weigher { total: energies[0].max(energies[1]), radius2, moved }
+    }
+
+    /// The change that a pair is; `None` if it is none, looked at closely.
+    fn change(&self, pair: &Pair, describer: &Describer) -> Option<Change> {
+        let before = pair.before.as_ref().map(|half| describer.describe(0, half));
+        let after = pair.after.as_ref().map(|half| describer.describe(1, half));
+        let differences = match (&before, &after) {
+            (Some(before), Some(after)) if !pair.is_renamed_only() => differences(before, after),
+            _ => Vec::new(),
+        };
+        if pair.verb == Verb::Dirtied && differences.is_empty() {
+            return None;
+        }
+        let energy = |half: &Option<Half>| match half {
+            Some(Half::Lit(light)) => match light.row {
+                Row::Near(_) => f64::from(light.energy),
+                Row::Infinite(_) => f64::from(light.energy) * self.radius2,
+            },
+            _ => 0.0,
+        };
+        let gained = (energy(&pair.after) - energy(&pair.before)).abs();
+        let of_energy = if gained > 0.0 { gained / self.total } else { 0.0 };
+        Some(Change {
+            verb: pair.verb,
+            share: of_energy.max(self.moved[pair.number as usize]),
+            before: before.map(|described| described.card),
+            after: after.map(|described| described.card),
+            differences,
+        })
+    }
+}

@@ -1,0 +1,45 @@
+//! Both versions described from like sources, so that nothing differs but what changed.
+
+use super::Mark;
+use super::light::{Described, Light};
+use super::pairs::Half;
+use super::scene_side::SceneSide;
+use super::side::{Surveyed, TreeBytes};
+use super::tree_side::Places;
+use crate::light_tree::LightTree;
+
+/// Describes lights of either version: from the scenes if both are, else from both trees.
+pub(super) enum Describer<'a> {
+    Scenes([&'a SceneSide<'a>; 2]),
+    Trees([Places<'a, TreeBytes<'a>>; 2]),
+}
+
+impl<'a> Describer<'a> {
+    pub fn new(
+        sides: [&'a Surveyed<'a>; 2],
+        trees: [&'a LightTree<TreeBytes<'a>>; 2],
+    ) -> Describer<'a> {
+        match sides.map(|side| side.scene()) {
+            [Some(before), Some(after)] => Describer::Scenes([before, after]),
+            _ => Describer::Trees(trees.map(|tree| Places::find(tree))),
+        }
+    }
+
+    /// Half a pair; `side` is 0 before and 1 after.
+    pub fn describe(&self, side: usize, half: &Half) -> Described {
+        match (half, self) {
+            (Half::Lit(light), Describer::Scenes(scenes)) => scenes[side].describe(light),
+            (Half::Lit(light), Describer::Trees(places)) => places[side].describe(light),
+            (Half::Dark(path, dark), Describer::Scenes(scenes)) => {
+                scenes[side].describe_dark(path, *dark)
+            }
+            (Half::Dark(..), Describer::Trees(_)) => unreachable!("a tree knows no dark prims"),
+        }
+    }
+
+    /// Where a light of the version after is.
+    pub fn mark(&self, light: &Light) -> Option<Mark> {
+        let card = self.describe(1, &Half::Lit(*light)).card;
+        Some(Mark { center_m: card.place?.center_m, energy_cd: card.energy })
+    }
+}

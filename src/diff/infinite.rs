@@ -1,0 +1,95 @@
+//! Suns and domes, which no tree holds.
+
+use super::card::Kind;
+use super::light::{Light, Profile, Row};
+use super::profile::{add_texture, short};
+use super::scene_side::kind;
+use crate::emitter::infinite_lights;
+use crate::light_tree::{LightLook, LightRow};
+use crate::scene::{Keys, LightKind, Pose, Scene};
+use glam::Vec3;
+use std::collections::HashMap;
+
+/// A light at infinity that shines in some frame.
+pub(super) struct Infinite {
+    /// Its row in [`Scene::lights`].
+    pub light: u32,
+    fingerprint: [u8; 32],
+    class: u32,
+    kind: Kind,
+    color: [u16; 3],
+    illuminance_lux: f32,
+    profile: Profile,
+}
+
+/// Those of a scene, as they are in a pose; what they do in some frames is in their fingerprints.
+pub(super) fn find(scene: &Scene, pose: &Pose, frames: &[i32]) -> Vec<Infinite> {
+    let shining = infinite_lights(scene, pose);
+    let illuminance: HashMap<usize, f64> =
+        shining.iter().map(|light| (light.light, light.importance(Vec3::ZERO))).collect();
+    let moving = scene.moving_nodes();
+    let lights = scene.lights.iter().enumerate().filter(|&(row, light)| {
+        light.kind.is_infinite() && scene.peak_rgb_of_light(row as u32).max_element() > 0.0
+    });
+    let found = lights.map(|(row, light)| {
+        let rgb = scene.rgb_of_light(row as u32, pose);
+        let (moves, varies) = (moving[light.node as usize], light.values.is_some());
+        let profile = profile(scene, &light.kind);
+        let mut hasher = blake3::Hasher::new();
+        hasher.update(&profile.pattern.to_le_bytes());
+        hasher.update(&profile.half_angle_rad.unwrap_or(0.0).to_le_bytes());
+        hasher.update(bytemuck::bytes_of(&rgb));
+        hasher.update(bytemuck::bytes_of(&pose.world(light.node).matrix3.to_cols_array()));
+        if let Some(Keys { times_s, values, interpolation }) = &light.values {
+            hasher.update(bytemuck::cast_slice(times_s)).update(bytemuck::cast_slice(values));
+            hasher.update(&[*interpolation as u8]);
+        }
+        for &frame in if moves { frames } else { &[] } {
+            let pose = scene.pose_at(scene.timeline.seconds_at(f64::from(frame)));
+            hasher.update(bytemuck::bytes_of(&pose.world(light.node).matrix3.to_cols_array()));
+        }
+        let bit = |is: bool, bit: u32| if is { bit } else { 0 };
+        Infinite {
+            light: row as u32,
+            fingerprint: *hasher.finalize().as_bytes(),
+            class: bit(light.forced, LightRow::FORCED) + bit(moves || varies, LightRow::CHANGES),
+            kind: kind(&light.kind),
+            color: LightLook::new(0, rgb).color,
+            illuminance_lux: illuminance.get(&row).copied().unwrap_or(0.0) as f32,
+            profile,
+        }
+    });
+    found.collect()
+}
+
+/// The picture of a dome, the size of a sun.
+fn profile(scene: &Scene, kind: &LightKind) -> Profile {
+    match *kind {
+        LightKind::Dome { texture: Some(texture), .. } => {
+            let mut hasher = blake3::Hasher::new();
+            add_texture(&mut hasher, &scene.textures[texture as usize]);
+            Profile { pattern: short(&hasher), half_angle_rad: None }
+        }
+        LightKind::Distant { angle_rad, .. } => {
+            Profile { pattern: 0, half_angle_rad: Some(0.5 * angle_rad) }
+        }
+        _ => Profile::default(),
+    }
+}
+
+impl Infinite {
+    /// As it is matched; `row` is its place among those at infinity.
+    pub fn as_light<'a>(&self, scene: &'a Scene, row: u32) -> Light<'a> {
+        Light {
+            path: scene.light_path(self.light as usize),
+            row: Row::Infinite(row),
+            fingerprint: self.fingerprint,
+            class: self.class,
+            kind: Some(self.kind),
+            color: self.color,
+            energy: self.illuminance_lux,
+            emitters: 0,
+            profile: self.profile,
+        }
+    }
+}

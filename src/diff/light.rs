@@ -1,0 +1,103 @@
+//! One light as it is matched, and as it is compared with another.
+
+use super::card::{Kind, LightCard};
+use crate::light_tree::{LightLook, LightRow};
+use glam::Affine3A;
+
+/// What all lights of both versions are matched by: as little as will do, for there may be millions.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Light<'a> {
+    pub path: &'a str,
+    pub row: Row,
+    /// Over what the tree depends on.
+    pub fingerprint: [u8; 32],
+    /// Of [`LightRow`].
+    pub class: u32,
+    pub kind: Option<Kind>,
+    /// The hue, coded as in [`LightLook`].
+    pub color: [u16; 3],
+    /// In the unit of [`LightCard::energy`].
+    pub energy: f32,
+    pub emitters: u32,
+    /// What a scene says beyond its survey; a tree says nothing.
+    pub profile: Profile,
+}
+
+/// Where a light is found again.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Row {
+    /// In the order of the emitters.
+    Near(u32),
+    /// At infinity, in the order of the scene's lights.
+    Infinite(u32),
+}
+
+/// How the light of a prim is spread, as its author says.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct Profile {
+    /// Over its texture and its shaping but for the half angle.
+    pub pattern: u128,
+    /// Half angle of the shaping, radians, if it has one.
+    pub half_angle_rad: Option<f32>,
+}
+
+/// Everything that two versions of a light are compared by.
+#[derive(Clone, Debug)]
+pub(super) struct Described {
+    pub card: LightCard,
+    /// From its own space to the world's, if that is known.
+    pub to_world: Option<Affine3A>,
+    /// Over its emitters in its own space, if they are known.
+    pub shape: Option<u128>,
+    /// Whether it aims to either side of its axis.
+    pub two_sided: bool,
+    pub profile: Profile,
+    /// Whether it has a tree of its own, which says less of where its emitters are.
+    pub placed: bool,
+}
+
+impl Light<'_> {
+    /// Whether nothing of it differs, except perhaps the path.
+    pub fn has_content_of(&self, other: &Light) -> bool {
+        self.fingerprint == other.fingerprint
+            && self.class == other.class
+            && self.look() == other.look()
+            && self.profile == other.profile
+    }
+
+    fn look(&self) -> (Option<Kind>, [u16; 3]) {
+        (self.kind, self.color)
+    }
+
+    pub fn is(&self, property: u32) -> bool {
+        self.class & property != 0
+    }
+
+    /// What a card of it says before it is known where the light is.
+    pub fn card(&self) -> LightCard {
+        LightCard {
+            path: self.path.to_owned(),
+            kind: self.kind,
+            emitters: self.emitters,
+            energy: self.energy,
+            color: LightLook { kind: 0, color: self.color }.hue().map(|hue| hue.to_array()),
+            place: None,
+            axis: None,
+            half_angle_deg: 180.0,
+            range_m: None,
+            forced: self.is(LightRow::FORCED),
+            changes: self.is(LightRow::CHANGES),
+        }
+    }
+}
+
+/// The kind that a tree's row tells.
+pub(super) fn kind_of(look: &LightLook) -> Option<Kind> {
+    match look.kind {
+        LightLook::MESH => Some(Kind::Mesh),
+        LightLook::POINT => Some(Kind::Point),
+        LightLook::SPOT => Some(Kind::Spot),
+        LightLook::SPHERE => Some(Kind::Sphere),
+        _ => None,
+    }
+}

@@ -1,0 +1,102 @@
+//! Floor 6: what changed between two versions of a scene, as far as its light goes.
+//!
+//! A version is a [`Side`]: a scene, or the tree file that was built from it. [`compare`] matches the
+//! lights of both and says which were added, removed, dirtied or renamed, of the dirtied *what*
+//! changed and *by how much*, and what that does to picking. Prims that send no light are not
+//! compared; where they change what the camera sees of the lights, the [`HeatMap`] shows it.
+//!
+//! Two scenes are compared by what their files say. A tree file knows less: of its lights the bounds,
+//! the energy, the kind, the colour and a fingerprint. Against a tree, a scene is therefore surveyed as
+//! for a build, and both are compared by what both have; so a tree that is fresh differs in nothing.
+//!
+//! | file | what |
+//! |---|---|
+//! | `card` | one light, described |
+//! | `change` | one light that differs, and each [`Difference`] with its amount |
+//! | `totals` | how many lights and how much of them, before and after |
+//! | `picking` | how far the probabilities of picks moved |
+//! | `heat` | where in a camera's view direct light changed |
+//! | `html` | a comparison as a page |
+
+mod amounts;
+mod card;
+mod change;
+mod compare;
+mod describe;
+mod folder;
+mod heat;
+mod html;
+mod infinite;
+pub mod json;
+mod light;
+mod matching;
+mod pairs;
+mod picking;
+mod probes;
+mod profile;
+mod scene_side;
+mod side;
+mod text;
+mod totals;
+mod tree_side;
+
+pub use card::{Kind, LightCard, Place};
+pub use change::{Change, Difference, Verb};
+pub use compare::{DiffOptions, compare};
+pub use folder::{FolderDiff, Outcome, Shot, compare_folders};
+pub use heat::{HeatCell, HeatMap};
+pub use html::html;
+pub use picking::{PickingChange, ProbePlaces};
+pub use side::{Side, SideError};
+pub use text::Text;
+pub use totals::{Tally, Totals};
+
+use serde::Serialize;
+
+/// What differs between two versions.
+#[derive(Clone, Debug, Serialize)]
+pub struct Diff {
+    /// The version before.
+    pub before: SideName,
+    /// The version after.
+    pub after: SideName,
+    /// Sums over all lights of each.
+    pub totals: Totals,
+    /// How far the probabilities of picks moved; `None` where neither version has a light to pick.
+    pub picking: Option<PickingChange>,
+    /// The lights that differ, what matters most to the light first.
+    pub changes: Vec<Change>,
+    /// Where the lights stand that are the same in both, for a picture of the whole. Only if asked
+    /// for.
+    #[serde(skip)]
+    pub unchanged: Vec<Mark>,
+    /// Where in the camera's view direct light changed. Only if asked for, and if both versions are
+    /// scenes with a camera.
+    #[serde(skip)]
+    pub heat: Option<HeatMap>,
+}
+
+/// What a version was read from.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct SideName {
+    /// Its file, as the user named it.
+    pub file: String,
+    /// Whether it is a tree file and not a scene.
+    pub is_tree: bool,
+}
+
+/// A light of which nothing is said but where it stands and how strong it is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Mark {
+    /// Middle of its box, world space, metres.
+    pub center_m: [f32; 3],
+    /// Peak radiant intensity, summed over its emitters, candela.
+    pub energy_cd: f32,
+}
+
+impl Diff {
+    /// Whether the lights are the same and picked alike.
+    pub fn is_same(&self) -> bool {
+        self.changes.is_empty() && self.picking.as_ref().is_none_or(|picking| picking.worst == 0.0)
+    }
+}

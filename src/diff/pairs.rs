@@ -1,0 +1,97 @@
+//! The lights of both versions, side by side: what is to be compared with what.
+
+use super::change::Verb;
+use super::light::Light;
+use super::matching::matching;
+use super::scene_side::Dark;
+use super::side::Surveyed;
+
+/// A light of one version, or a prim that might be one and is dark.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Half<'a> {
+    Lit(Light<'a>),
+    Dark(&'a str, Dark),
+}
+
+/// Two versions of a light; or one, if the other does not have it.
+pub(super) struct Pair<'a> {
+    pub verb: Verb,
+    pub before: Option<Half<'a>>,
+    pub after: Option<Half<'a>>,
+    /// The light's number, the same in both versions.
+    pub number: u32,
+}
+
+impl Pair<'_> {
+    /// Whether it has another path and nothing else differs.
+    pub fn is_renamed_only(&self) -> bool {
+        match (&self.before, &self.after) {
+            (Some(Half::Lit(before)), Some(Half::Lit(after))) => before.has_content_of(after),
+            _ => false,
+        }
+    }
+}
+
+/// All lights of both.
+pub(super) struct Pairs<'a> {
+    /// Those that are not known to be the same.
+    pub changed: Vec<Pair<'a>>,
+    /// Those that are, by row of the version after.
+    pub unchanged: Vec<u32>,
+    /// Of each row of the version after its light's number. That of a row before is the row.
+    pub number_of_after: Vec<u32>,
+    /// How many numbers there are.
+    pub count: usize,
+}
+
+impl<'a> Pairs<'a> {
+    pub fn of(sides: [&'a Surveyed; 2], [before, after]: [&[Light<'a>]; 2]) -> Pairs<'a> {
+        let found = matching(before, after);
+        let count = before.len() + found.added.len();
+        let mut pairs = Pairs {
+            changed: Vec::new(),
+            unchanged: Vec::new(),
+            number_of_after: vec![0; after.len()],
+            count,
+        };
+        for (&row, number) in found.added.iter().zip(before.len() as u32..) {
+            pairs.number_of_after[row as usize] = number;
+        }
+        let same_path = found.same_path.iter().map(|pair| (pair, Verb::Dirtied));
+        let renamed = found.renamed.iter().map(|pair| (pair, Verb::Renamed));
+        for (&(b, a), verb) in same_path.chain(renamed) {
+            pairs.number_of_after[a as usize] = b;
+            let (then, now) = (before[b as usize], after[a as usize]);
+            if verb == Verb::Dirtied && then.has_content_of(&now) {
+                pairs.unchanged.push(a);
+            } else {
+                let (then, now) = (Some(Half::Lit(then)), Some(Half::Lit(now)));
+                pairs.changed.push(Pair { verb, before: then, after: now, number: b });
+            }
+        }
+        // A light that one scene lacks may be there as a prim that is dark: then it was switched.
+        let dark = |side: usize, only: &[u32]| match sides[side].scene() {
+            Some(scene) if !only.is_empty() => scene.dark_prims(),
+            _ => Default::default(),
+        };
+        let (dark_before, dark_after) = (dark(0, &found.added), dark(1, &found.removed));
+        let verb =
+            |other: &Option<Half>, alone| if other.is_some() { Verb::Dirtied } else { alone };
+        for &row in &found.removed {
+            let light = before[row as usize];
+            let after =
+                dark_after.get_key_value(light.path).map(|(path, dark)| Half::Dark(path, *dark));
+            let verb = verb(&after, Verb::Removed);
+            pairs.changed.push(Pair { verb, before: Some(Half::Lit(light)), after, number: row });
+        }
+        for &row in &found.added {
+            let light = after[row as usize];
+            let before =
+                dark_before.get_key_value(light.path).map(|(path, dark)| Half::Dark(path, *dark));
+            let verb = verb(&before, Verb::Added);
+            let number = pairs.number_of_after[row as usize];
+            pairs.changed.push(Pair { verb, before, after: Some(Half::Lit(light)), number });
+        }
+        pairs
+    }
+}

@@ -1,0 +1,205 @@
+//! What a scene tells of its lights: everything.
+
+use super::card::{Kind, LightCard};
+use super::infinite::{self, Infinite};
+use super::light::{Described, Light, Profile, Row, kind_of};
+use super::profile::Profiles;
+use super::tree_side::place;
+use crate::bounds::{Aabb, LightBounds};
+use crate::emitter::{
+    Emitters, InfiniteLight, LightOverflow, LightSource, PosedEmitters, infinite_lights,
+};
+use crate::pipeline::{self, BuildOptions, Survey};
+use crate::scene::{LightKind, Pose, Scene};
+use crate::store::AlignedBytes;
+use glam::Vec3;
+use std::collections::HashMap;
+
+/// A scene, surveyed as for a build.
+pub(super) struct SceneSide<'a> {
+    pub scene: &'a Scene,
+    pub emitters: Emitters,
+    /// Of all frames, but with the bounds of the first alone.
+    pub survey: Survey,
+    /// The first frame.
+    pub frame: i32,
+    /// In that frame.
+    pub pose: Pose,
+    profiles: Profiles,
+    infinite: Vec<Infinite>,
+}
+
+impl<'a> SceneSide<'a> {
+    /// Surveys a scene for some frames, its own if none are given.
+    pub fn survey(scene: &'a Scene, frames: Option<&[i32]>) -> Result<Self, LightOverflow> {
+        let own = || pipeline::frames_of(scene);
+        let frames = frames.map_or_else(own, <[i32]>::to_vec);
+        let emitters = Emitters::collect(scene);
+        let mut survey = pipeline::survey(scene, &emitters, &frames)?;
+        survey.frames.truncate(1);
+        let pose = scene.pose_at(scene.timeline.seconds_at(f64::from(frames[0])));
+        let profiles = Profiles::of(scene, &emitters);
+        let infinite = infinite::find(scene, &pose, &frames);
+        Ok(SceneSide { scene, emitters, survey, frame: frames[0], pose, profiles, infinite })
+    }
+
+    /// The tree of the first frame.
+    pub fn build(&self) -> AlignedBytes {
+        pipeline::build_tree(&self.survey, &BuildOptions::default())
+    }
+
+    /// The lights at infinity that are picked and shine in the first frame, with their numbers, which
+    /// are given in the order of [`lights`](Self::lights).
+    pub fn infinite_to_pick(&self, numbers: &[u32]) -> Vec<(u32, InfiniteLight<'_>)> {
+        let picked = infinite_lights(self.scene, &self.pose).into_iter().filter(|l| !l.forced);
+        let number = |light: &InfiniteLight| {
+            let row = self.infinite.iter().position(|own| own.light as usize == light.light);
+            numbers[row.expect("what shines now shines in some frame")]
+        };
+        picked.map(|light| (number(&light), light)).collect()
+    }
+
+    pub fn lights(&self) -> Vec<Light<'_>> {
+        let near = (0..).zip(self.emitters.lights()).zip(&self.survey.lights);
+        let near = near.map(|((row, entry), summary)| Light {
+            path: &entry.path,
+            row: Row::Near(row),
+            fingerprint: summary.fingerprint,
+            class: summary.class,
+            kind: kind_of(&summary.look),
+            color: summary.look.color,
+            energy: summary.energy,
+            emitters: summary.emitter_count,
+            profile: self.profiles.of_light(self.scene, entry.source),
+        });
+        let infinite =
+            (0..).zip(&self.infinite).map(|(row, light)| light.as_light(self.scene, row));
+        near.chain(infinite).collect()
+    }
+
+    fn posed(&self) -> PosedEmitters<'_> {
+        PosedEmitters { scene: self.scene, emitters: &self.emitters, pose: &self.pose }
+    }
+
+    /// A light, described.
+    pub fn describe(&self, light: &Light) -> Described {
+        let mut described = Described {
+            card: light.card(),
+            to_world: None,
+            shape: None,
+            two_sided: false,
+            profile: light.profile,
+            placed: false,
+        };
+        let row = match light.row {
+            Row::Near(row) => row,
+            Row::Infinite(row) => {
+                let node = self.scene.lights[self.infinite[row as usize].light as usize].node;
+                let to_world = self.pose.world(node);
+                described.to_world = Some(to_world);
+                if let Some(half_angle) = light.profile.half_angle_rad {
+                    let toward = -Vec3::from(to_world.matrix3.z_axis);
+                    described.card.axis = toward.try_normalize().map(|axis| axis.to_array());
+                    described.card.half_angle_deg = half_angle.to_degrees();
+                }
+                return described;
+            }
+        };
+        let entry = &self.emitters.lights()[row as usize];
+        let bounds = self.posed().bounds(entry.first..entry.first + entry.count);
+        let bounds = bounds.expect("the survey found every light in range");
+        let bounds =
+            if let [one] = bounds.as_slice() { *one } else { LightBounds::around(&bounds) };
+        described.two_sided = bounds.cone.two_sided;
+        place(&mut described.card, &bounds);
+        if let Some(half_angle) = light.profile.half_angle_rad {
+            described.card.half_angle_deg = half_angle.to_degrees();
+        }
+        let node = match entry.source {
+            LightSource::Mesh { instance, mesh_light } => {
+                described.shape = Some(self.profiles.shape(mesh_light));
+                self.scene.instances[instance as usize].node
+            }
+            LightSource::Light(row) => self.scene.lights[row as usize].node,
+        };
+        described.to_world = Some(self.pose.world(node));
+        described
+    }
+
+    /// The prims that might shine and do not, by path: what a light was before it was lit.
+    pub fn dark_prims(&self) -> HashMap<&str, Dark> {
+        let is_lit: std::collections::HashSet<&str> =
+            self.lights().iter().map(|light| light.path).collect();
+        let meshes = (0..)
+            .zip(&self.scene.instances)
+            .map(|(row, instance)| (instance.path.as_str(), Dark::Mesh(row)));
+        let lights = (0..self.scene.lights.len())
+            .map(|row| (self.scene.light_path(row), Dark::Light(row as u32)));
+        meshes.chain(lights).filter(|(path, _)| !is_lit.contains(path)).collect()
+    }
+
+    /// One of them, described.
+    pub fn describe_dark(&self, path: &str, dark: Dark) -> Described {
+        let (node, kind, forced, aabb) = match dark {
+            Dark::Mesh(row) => {
+                let instance = &self.scene.instances[row as usize];
+                let mesh = &self.scene.meshes[instance.mesh as usize];
+                let world = self.pose.world(instance.node);
+                let corners = mesh.positions.iter().map(|&p| world.transform_point3(p));
+                (instance.node, Kind::Mesh, instance.forced, Aabb::around(corners))
+            }
+            Dark::Light(row) => {
+                let light = &self.scene.lights[row as usize];
+                let here = self.pose.world(light.node).translation.into();
+                (light.node, kind(&light.kind), light.forced, Aabb::around([here]))
+            }
+        };
+        let mut card = LightCard {
+            path: path.to_owned(),
+            kind: Some(kind),
+            emitters: 0,
+            energy: 0.0,
+            color: None,
+            place: None,
+            axis: None,
+            half_angle_deg: 180.0,
+            range_m: None,
+            forced,
+            changes: false,
+        };
+        if !kind.is_infinite() && !aabb.is_empty() {
+            card.place = Some(super::Place {
+                center_m: aabb.center().to_array(),
+                size_m: aabb.extent().to_array(),
+            });
+        }
+        Described {
+            card,
+            to_world: Some(self.pose.world(node)),
+            shape: None,
+            two_sided: false,
+            profile: Profile::default(),
+            placed: false,
+        }
+    }
+}
+
+/// A prim that might shine and does not.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Dark {
+    /// A row of the scene's instances.
+    Mesh(u32),
+    /// A row of the scene's lights.
+    Light(u32),
+}
+
+/// The word for a kind of the scene.
+pub(super) fn kind(kind: &LightKind) -> Kind {
+    match kind {
+        LightKind::Point { .. } => Kind::Point,
+        LightKind::Spot { .. } => Kind::Spot,
+        LightKind::Sphere { .. } => Kind::Sphere,
+        LightKind::Distant { .. } => Kind::Sun,
+        LightKind::Dome { .. } => Kind::Dome,
+    }
+}

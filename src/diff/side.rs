@@ -1,0 +1,194 @@
+//! A version, opened: a scene or a tree file.
+
+use super::SideName;
+use super::light::Light;
+use super::scene_side::SceneSide;
+use super::tree_side::TreeSide;
+use crate::emitter::LightOverflow;
+use crate::ingest::IngestError;
+use crate::light_tree::LightTree;
+use crate::pipeline::{self, OpenedTree, TreeError};
+use crate::scene::Scene;
+use crate::store::{AlignedBytes, Mmap};
+use std::path::{Path, PathBuf};
+
+/// A version to be compared.
+pub struct Side {
+    name: SideName,
+    content: Content,
+}
+
+enum Content {
+    Tree(Mmap),
+    Scene(Box<Scene>),
+}
+
+/// Why versions cannot be compared.
+#[derive(Debug, thiserror::Error)]
+pub enum SideError {
+    /// A tree file cannot be used.
+    #[error(transparent)]
+    Tree(#[from] TreeError),
+    /// A scene cannot be read.
+    #[error(transparent)]
+    Scene(#[from] IngestError),
+    /// A scene has a light that no tree can hold.
+    #[error("{}: {cause}", path.display())]
+    Overflow {
+        /// The scene's file.
+        path: PathBuf,
+        /// Which light.
+        cause: LightOverflow,
+    },
+    /// A folder cannot be walked.
+    #[error(transparent)]
+    Folder(#[from] walkdir::Error),
+    /// One is a folder of shots, the other a file.
+    #[error(
+        "{}: is a folder and {} is not; compare two folders of shots, or two files",
+        folder.display(),
+        file.display()
+    )]
+    FolderAndFile {
+        /// The folder.
+        folder: PathBuf,
+        /// The file.
+        file: PathBuf,
+    },
+}
+
+impl Side {
+    /// Opens a tree file (`.ltree`), which is verified, or reads a scene.
+    ///
+    /// # Errors
+    /// If it cannot be read or is not sound.
+    pub fn open(path: &Path) -> Result<Side, SideError> {
+        if is_tree_file(path) {
+            return Ok(Side::of_tree(path, pipeline::open_tree(path, true)?));
+        }
+        let scene = pipeline::load_scene(path)?;
+        Ok(Side::of_scene(scene))
+    }
+
+    /// A tree file that is open. It must have been verified.
+    pub fn of_tree(path: &Path, tree: OpenedTree) -> Side {
+        let name = SideName { file: path.display().to_string(), is_tree: true };
+        Side { name, content: Content::Tree(tree.into_bytes()) }
+    }
+
+    /// A scene that has been read.
+    pub fn of_scene(scene: Scene) -> Side {
+        let name = SideName { file: scene.source.display().to_string(), is_tree: false };
+        Side { name, content: Content::Scene(Box::new(scene)) }
+    }
+
+    /// What it was read from.
+    pub fn name(&self) -> &SideName {
+        &self.name
+    }
+
+    /// The scene, if it is one.
+    pub fn scene(&self) -> Option<&Scene> {
+        match &self.content {
+            Content::Tree(_) => None,
+            Content::Scene(scene) => Some(scene),
+        }
+    }
+
+    fn tree(&self) -> Option<TreeSide<'_>> {
+        match &self.content {
+            Content::Tree(bytes) => Some(TreeSide::new(bytes)),
+            Content::Scene(_) => None,
+        }
+    }
+}
+
+/// Whether a path is that of a tree file.
+pub(super) fn is_tree_file(path: &Path) -> bool {
+    path.extension().is_some_and(|e| e.eq_ignore_ascii_case("ltree"))
+}
+
+/// A version whose lights are known.
+pub(super) enum Surveyed<'a> {
+    Tree(TreeSide<'a>),
+    Scene(SceneSide<'a>),
+}
+
+/// The bytes of a tree: of a file, or just built.
+pub(super) enum TreeBytes<'a> {
+    Mapped(&'a [u8]),
+    Built(AlignedBytes),
+}
+
+impl AsRef<[u8]> for TreeBytes<'_> {
+    fn as_ref(&self) -> &[u8] {
+        match self {
+            TreeBytes::Mapped(bytes) => bytes,
+            TreeBytes::Built(bytes) => bytes.as_ref(),
+        }
+    }
+}
+
+impl<'a> Surveyed<'a> {
+    /// Surveys both. A scene beside a tree is surveyed for the frames of the tree, if it has any.
+    pub fn both(before: &'a Side, after: &'a Side) -> Result<[Surveyed<'a>; 2], SideError> {
+        let trees = [before.tree(), after.tree()];
+        let frames = trees.iter().flatten().map(TreeSide::frames).find(|frames| !frames.is_empty());
+        let survey = |side: &'a Side, tree: Option<TreeSide<'a>>| {
+            if let Some(tree) = tree {
+                return Ok(Surveyed::Tree(tree));
+            }
+            let scene = side.scene().expect("what is no tree is a scene");
+            let surveyed = SceneSide::survey(scene, frames.as_deref());
+            surveyed
+                .map(Surveyed::Scene)
+                .map_err(|cause| SideError::Overflow { path: scene.source.clone(), cause })
+        };
+        let [tree_before, tree_after] = trees;
+        let (before, after) =
+            rayon::join(|| survey(before, tree_before), || survey(after, tree_after));
+        Ok([before?, after?])
+    }
+
+    /// Whether both are trees that say the same of all lights: fingerprints and checksums, which have
+    /// been verified, decide.
+    pub fn has_rows_of(&self, other: &Surveyed) -> bool {
+        match (self, other) {
+            (Surveyed::Tree(own), Surveyed::Tree(other)) => own.has_rows_of(other),
+            _ => false,
+        }
+    }
+
+    /// Over all that a tree depends on.
+    pub fn fingerprint(&self) -> [u8; 32] {
+        match self {
+            Surveyed::Tree(side) => side.fingerprint(),
+            Surveyed::Scene(side) => side.survey.fingerprint,
+        }
+    }
+
+    /// The lights, those at infinity last and only if this is a scene.
+    pub fn lights(&self) -> Vec<Light<'_>> {
+        match self {
+            Surveyed::Tree(side) => side.lights(),
+            Surveyed::Scene(side) => side.lights(),
+        }
+    }
+
+    /// The scene, if it is one.
+    pub fn scene(&self) -> Option<&SceneSide<'a>> {
+        match self {
+            Surveyed::Tree(_) => None,
+            Surveyed::Scene(side) => Some(side),
+        }
+    }
+
+    /// Its tree, for the first frame at least.
+    pub fn tree(&self) -> LightTree<TreeBytes<'a>> {
+        let bytes = match self {
+            Surveyed::Tree(side) => TreeBytes::Mapped(side.bytes()),
+            Surveyed::Scene(side) => TreeBytes::Built(side.build()),
+        };
+        LightTree::open(bytes).expect("it was open before, or was just built")
+    }
+}

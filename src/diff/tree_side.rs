@@ -1,0 +1,186 @@
+//! What a tree file tells of its lights.
+//!
+//! Where a light is, its leaves tell: their decoded boxes and cones, which are a little wider than
+//! what they bound. A light with a tree of its own has a transform too.
+
+use super::card::{LightCard, Place};
+use super::light::{Described, Light, Profile, Row, kind_of};
+use crate::bounds::{Cone, LightBounds};
+use crate::light_tree::{InstanceRow, LightRow, LightTree, Link, Node, TreeKind, TreeRow};
+use glam::{Affine3A, Mat3, Vec3};
+use std::collections::HashMap;
+use std::f32::consts::PI;
+
+/// A tree, opened.
+pub(super) struct TreeSide<'a> {
+    bytes: &'a [u8],
+    tree: LightTree<&'a [u8]>,
+}
+
+impl<'a> TreeSide<'a> {
+    /// Over the bytes of a tree that has been open before.
+    pub fn new(bytes: &'a [u8]) -> TreeSide<'a> {
+        TreeSide { bytes, tree: LightTree::open(bytes).expect("it was open before") }
+    }
+
+    pub fn bytes(&self) -> &'a [u8] {
+        self.bytes
+    }
+
+    /// The frames that have trees of their own.
+    pub fn frames(&self) -> Vec<i32> {
+        self.tree.frames().iter().map(|row| row.frame).collect()
+    }
+
+    pub fn fingerprint(&self) -> [u8; 32] {
+        self.tree.fingerprint()
+    }
+
+    /// Whether fingerprint and checksums of the lights' rows are the same.
+    pub fn has_rows_of(&self, other: &TreeSide) -> bool {
+        let rows = |side: &TreeSide| {
+            let sections = side.tree.sections().iter();
+            let of_lights = sections.filter(|section| [b"LGHT", b"PATH"].contains(&&section.id.0));
+            of_lights.map(|section| (section.length, section.checksum)).collect::<Vec<_>>()
+        };
+        self.fingerprint() == other.fingerprint() && rows(self) == rows(other)
+    }
+
+    pub fn lights(&self) -> Vec<Light<'_>> {
+        let light = |(row, light)| of_row(&self.tree, row, light);
+        (0..).zip(self.tree.lights()).map(light).collect()
+    }
+}
+
+fn of_row<'a, D: AsRef<[u8]>>(tree: &'a LightTree<D>, row: u32, light: &'a LightRow) -> Light<'a> {
+    Light {
+        path: tree.light_path(light),
+        row: Row::Near(row),
+        fingerprint: light.fingerprint,
+        class: light.class,
+        kind: kind_of(&light.look),
+        color: light.look.color,
+        energy: light.energy,
+        emitters: light.emitter_count,
+        profile: Profile::default(),
+    }
+}
+
+/// Where the lights of a tree are in its first frame.
+pub(super) struct Places<'a, D> {
+    tree: &'a LightTree<D>,
+    /// By emitter; those of lights with trees of their own are not here.
+    leaves: Vec<Option<Node>>,
+    /// Those, by their first emitters.
+    placed: HashMap<u32, &'a InstanceRow>,
+}
+
+impl<'a, D: AsRef<[u8]>> Places<'a, D> {
+    pub fn find(tree: &'a LightTree<D>) -> Places<'a, D> {
+        let mut places =
+            Places { tree, leaves: vec![None; tree.emitter_count()], placed: HashMap::new() };
+        let first_frame = tree.frames().first().map(|frame| frame.tree);
+        for (row, own) in (0..).zip(tree.trees()) {
+            let is_sampled = match TreeKind::of(own) {
+                Some(TreeKind::Still) => true,
+                Some(TreeKind::Frame) => Some(row) == first_frame,
+                Some(TreeKind::Shared) | None => false,
+            };
+            if is_sampled {
+                places.add_leaves(own);
+            }
+        }
+        // Forced lights are in no tree but their own. Those that move stand in their first frame's.
+        for &row in tree.forced() {
+            let instance = &tree.instances()[row as usize];
+            places.placed.entry(instance.first_emitter).or_insert(instance);
+        }
+        places
+    }
+
+    fn add_leaves(&mut self, row: &TreeRow) {
+        for node in self.tree.groups_of(row).iter().flat_map(|group| group.nodes()) {
+            match node.link() {
+                Link::Emitter(emitter) => self.leaves[emitter as usize] = Some(node),
+                Link::Instance(row) => {
+                    let instance = &self.tree.instances()[row as usize];
+                    let below = &self.tree.trees()[instance.tree as usize];
+                    if TreeKind::of(below) == Some(TreeKind::Shared) {
+                        self.placed.insert(instance.first_emitter, instance);
+                    }
+                }
+                Link::Inner(_) | Link::Nothing => {}
+            }
+        }
+    }
+
+    /// A light, described.
+    pub fn describe(&self, light: &Light) -> Described {
+        let mut described = Described {
+            card: light.card(),
+            to_world: None,
+            shape: None,
+            two_sided: false,
+            profile: Profile::default(),
+            placed: light.is(LightRow::PLACED),
+        };
+        let Row::Near(row) = light.row else { return described };
+        let row = &self.tree.lights()[row as usize];
+        let bounds = match self.placed.get(&row.first_emitter) {
+            Some(instance) => {
+                let (bounds, to_world) = self.of_placed(instance);
+                described.to_world = Some(to_world);
+                Some(bounds)
+            }
+            None => self.around_leaves(row),
+        };
+        if let Some(bounds) = bounds {
+            described.two_sided = bounds.cone.two_sided;
+            place(&mut described.card, &bounds);
+        }
+        described
+    }
+
+    fn of_placed(&self, instance: &InstanceRow) -> (LightBounds, Affine3A) {
+        let to_local = Affine3A::from_mat3_translation(
+            Mat3::from_cols_array_2d(&instance.to_local.axes),
+            Vec3::from_array(instance.to_local.origin),
+        );
+        let to_world = to_local.inverse();
+        let own = self.tree.trees()[instance.tree as usize].root.bounds();
+        let axis = to_world.transform_vector3(own.cone.axis).normalize_or(Vec3::Z);
+        let bounds = LightBounds {
+            aabb: own.aabb.transformed(&to_world),
+            cone: Cone { axis, ..own.cone },
+            range_m: own.range_m / instance.to_local.scale(),
+            ..own
+        };
+        (bounds, to_world)
+    }
+
+    /// In the order of the emitters, so that the tree around them does not matter.
+    fn around_leaves(&self, row: &LightRow) -> Option<LightBounds> {
+        let leaves = self.leaves.get(row.first_emitter as usize..)?;
+        let own: Vec<LightBounds> = leaves[..row.emitter_count as usize]
+            .iter()
+            .flatten()
+            .map(|node| node.bounds())
+            .collect();
+        match own.as_slice() {
+            [] => None,
+            [one] => Some(*one),
+            all => Some(LightBounds::around(all)),
+        }
+    }
+}
+
+/// Fills in what bounds tell.
+pub(super) fn place(card: &mut LightCard, bounds: &LightBounds) {
+    let LightBounds { aabb, cone, range_m, .. } = bounds;
+    card.place =
+        Some(Place { center_m: aabb.center().to_array(), size_m: aabb.extent().to_array() });
+    card.axis = (cone.theta_o < PI).then(|| cone.axis.to_array());
+    let half_angle = if cone.two_sided { PI } else { (cone.theta_o + cone.theta_e).min(PI) };
+    card.half_angle_deg = half_angle.to_degrees();
+    card.range_m = range_m.is_finite().then_some(*range_m);
+}

@@ -1,0 +1,31 @@
+//! Floor 6: looking inside tree files and scenes.
+//!
+//! [`TreeReport`] and [`SceneReport`] are numbers, for programs and for people; [`dot`] is the top of a
+//! tree as a graph, [`html`] a page with pictures. None changes what it looks at, and none samples:
+//! what a tree is worth at a point is [`measure`](crate::measure)'s to say.
+//!
+//! | file | what |
+//! |---|---|
+//! | `report` | a tree file, its trees by kind and its heaviest lights |
+//! | `shape` | how deep, how full and how good a tree is |
+//! | `scene` | what is in a scene, and what it requires |
+//! | `walk` | every cluster and emitter of a frame as it stands in the world |
+//! | `dot` | the top of a tree for Graphviz |
+//! | `html` | the page |
+
+mod dot;
+mod html;
+mod report;
+mod scene;
+mod shape;
+mod walk;
+
+pub use dot::dot;
+pub use html::html;
+pub use report::{FrameSpan, LightReport, SectionReport, TreeReport};
+pub use scene::{CameraReport, SceneReport};
+pub use shape::{Shape, shapes};
+
+/// The version of the reports as JSON: in it fields may be added, and none changes or goes. Units are
+/// candela, metres and degrees; shares are in `[0, 1]`.
+pub const VERSION: u32 = 1;

@@ -1,0 +1,133 @@
+"""The pages of `inspect` and `diff`, in a real browser."""
+
+import io
+
+import pytest
+from conftest import HOSTILE
+from PIL import Image
+
+PAGES = ["inspect_page", "diff_page"]
+COLUMN = "[...document.querySelector('table').tBodies[0].rows].map(row => row.cells[%d].%s)"
+"""What stands in a column of the first table."""
+
+
+@pytest.fixture(params=PAGES)
+def page(request):
+    return request.getfixturevalue(request.param)
+
+
+def click(browser, heading: str) -> str:
+    """Clicks a heading with the mouse, and says how the table is sorted then."""
+    button = f"[...document.querySelectorAll('th button')].find(b => b.textContent === '{heading}')"
+    browser.run(f"{button}.scrollIntoView({{block: 'center'}})")
+    x, y = browser.run(f"(({{x, y, width, height}}) => [x + width / 2, y + height / 2])({button}.getBoundingClientRect())")
+    for what in ("mousePressed", "mouseReleased"):
+        browser.call("Input.dispatchMouseEvent", type=what, x=x, y=y, button="left", clickCount=1)
+    return browser.run(f"{button}.parentElement.getAttribute('aria-sort')")
+
+
+def test_it_loads_without_complaint_and_asks_for_nothing(browser, page):
+    browser.open(page)
+    assert not browser.happened("Runtime.exceptionThrown")
+    assert not browser.happened("Runtime.consoleAPICalled")
+    assert not browser.happened("Log.entryAdded")
+    urls = [event["request"]["url"] for event in browser.happened("Network.requestWillBeSent")]
+    assert [url for url in urls if not url.startswith("data:")] == [page.resolve().as_uri()]
+
+
+def test_hostile_names_are_inert(browser, page):
+    browser.open(page)
+    assert HOSTILE in browser.run("document.querySelector('table').textContent")
+    assert browser.run("document.scripts.length") == 1
+    assert browser.run("document.querySelectorAll('[onerror], [src=x]').length") == 0
+    assert browser.run("document.title") != "broken"
+
+
+def test_even_a_script_that_got_in_would_not_run(browser, page):
+    browser.open(page)
+    browser.run("document.body.append(Object.assign(document.createElement('script'), {text: 'window.ran = 1'}))")
+    browser.run("document.body.insertAdjacentHTML('beforeend', '<a id=trap onclick=\"window.ran = 1\">x</a>')")
+    browser.run("document.getElementById('trap').click()")
+    browser.run("fetch('https://example.org').catch(() => 0)")
+    assert browser.run("window.ran === undefined")
+    refused = {event["request"]["url"] for event in browser.happened("Network.requestWillBeSent")}
+    assert not any(url.startswith("https:") for url in refused)
+
+
+@pytest.mark.parametrize(("name", "heading"), [("inspect_page", "energy, cd"), ("diff_page", "after")])
+def test_a_click_sorts_numbers_and_another_turns_them_round(browser, request, name, heading):
+    browser.open(request.getfixturevalue(name))
+    headings = browser.run("[...document.querySelectorAll('table')[0].tHead.rows[0].cells].map(h => h.innerText)")
+    column = next(i for i, text in enumerate(headings) if text.startswith(heading))
+    values = lambda: [float(v or "-inf") for v in browser.run(COLUMN % (column, "dataset.value ?? ''"))]  # noqa: E731
+    assert click(browser, "path") == "ascending"
+    assert values() not in (sorted(values()), sorted(values(), reverse=True))
+    assert click(browser, heading) == "descending"
+    assert values() == sorted(values(), reverse=True)
+    assert click(browser, heading) == "ascending"
+    assert values() == sorted(values())
+    assert browser.run("document.querySelectorAll('[aria-sort]').length") == 1
+
+
+def test_names_sort_by_the_numbers_in_them(browser, inspect_page):
+    browser.open(inspect_page)
+    click(browser, "path")
+    lamps = [path for path in browser.run(COLUMN % (0, "textContent")) if "lamp" in path]
+    assert lamps == [f"/lamp_{i}" for i in range(50)]
+
+
+def test_a_heading_can_be_used_by_key(browser, page):
+    browser.open(page)
+    browser.run("document.querySelector('th button').focus()")
+    for what in ("keyDown", "keyUp"):
+        browser.call("Input.dispatchKeyEvent", type=what, key="Enter", code="Enter", windowsVirtualKeyCode=13, text="\r")
+    assert browser.run("document.querySelector('th').getAttribute('aria-sort')") == "ascending"
+
+
+def test_both_views_show_every_light_that_is_there(browser, inspect_page, diff_page):
+    browser.open(inspect_page)
+    assert browser.run("document.querySelectorAll('svg circle').length") == 2 * 51
+    browser.open(diff_page)
+    colours = {"green": 1, "red": 1, "orange": 3, "violet": 1, "grey": 46}
+    for colour, count in colours.items():
+        assert browser.run(f"document.querySelectorAll('svg circle.{colour}').length") == 2 * count
+    # Of those that changed, one moved.
+    assert browser.run("document.querySelectorAll('svg .trace').length") == 2
+
+
+def test_the_slider_leafs_through_the_levels(browser, inspect_page):
+    browser.open(inspect_page)
+    visible = "[...document.querySelectorAll('svg .boxes')].filter(p => p.checkVisibility()).map(p => p.dataset.level)"
+    last = browser.run("document.querySelector('input').max")
+    for level in ("0", last):
+        browser.run(f"(s => {{ s.value = {level}; s.dispatchEvent(new Event('input')); }})(document.querySelector('input'))")
+        assert browser.run(visible) == [level, level]
+    boxes = "document.querySelector(`svg .boxes[data-level='%s']`).getAttribute('d').match(/z/g).length"
+    assert browser.run(boxes % 0) == 1 < browser.run(boxes % last)
+
+
+def test_the_heat_map_shows_where_it_is_brighter(browser, diff_page):
+    browser.open(diff_page)
+    draw = """(async () => {
+        const image = document.querySelector('.heat img');
+        await image.decode();
+        const canvas = document.createElement('canvas');
+        [canvas.width, canvas.height] = [image.naturalWidth, image.naturalHeight];
+        const context = canvas.getContext('2d');
+        context.drawImage(image, 0, 0);
+        return [...context.getImageData(0, 0, canvas.width, canvas.height).data];
+    })()"""
+    data = browser.run(draw)
+    pixels = list(zip(data[::4], data[1::4], data[2::4], data[3::4]))
+    assert any(a == 255 and r > b + 40 for r, g, b, a in pixels), "somewhere it is brighter"
+    assert any(a == 255 and b > r + 40 for r, g, b, a in pixels), "somewhere it is darker"
+
+
+def test_dark_is_dark_and_light_is_light(browser, page):
+    def ground(dark: bool) -> float:
+        browser.open(page, dark)
+        picture = Image.open(io.BytesIO(browser.screenshot(800, 600))).convert("L")
+        return sorted(picture.get_flattened_data())[800 * 600 // 2]
+
+    assert ground(False) > 200
+    assert ground(True) < 60
