@@ -55,7 +55,8 @@ pub(super) fn differences(before: &Described, after: &Described) -> Vec<Differen
     if a.changes != b.changes || (a.changes && found.is_empty()) {
         found.push(Difference::OverTime { before: a.changes, after: b.changes });
     }
-    let respread = both_lit && before.profile.pattern != after.profile.pattern;
+    // What has become another kind has another profile.
+    let respread = both_lit && a.kind == b.kind && before.profile.pattern != after.profile.pattern;
     if respread || (found.is_empty() && !in_other_form) {
         found.push(Difference::Pattern);
     }

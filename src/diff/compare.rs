@@ -35,9 +35,13 @@ pub fn compare(before: &Side, after: &Side, options: &DiffOptions) -> Result<Dif
     if sides[0].has_rows_of(sides[1]) && !looks_closer {
         return Ok(same(names, tally(&sides[0].lights())));
     }
-    let [lights_before, lights_after] = comparable(sides);
+    let scenes = match sides.map(Surveyed::scene) {
+        [Some(before), Some(after)] => Some([before, after]),
+        _ => None,
+    };
+    let [lights_before, lights_after] = comparable(sides, scenes.is_some());
     let lights = [lights_before.as_slice(), lights_after.as_slice()];
-    let pairs = Pairs::of(sides, lights);
+    let pairs = Pairs::of(scenes, lights);
     let tallies = lights.map(tally);
     let is_same = sides[0].fingerprint() == sides[1].fingerprint() && pairs.changed.is_empty();
     if is_same && !looks_closer {
@@ -46,7 +50,7 @@ pub fn compare(before: &Side, after: &Side, options: &DiffOptions) -> Result<Dif
     let (tree_before, tree_after) = rayon::join(|| sides[0].tree(), || sides[1].tree());
     let trees = [&tree_before, &tree_after];
     let (picking, moved) = compare_picking(sides, trees, lights, &pairs);
-    let describer = Describer::new(sides, trees);
+    let describer = Describer::new(scenes, trees);
     let weigher = Weigher::new(trees, tallies, &moved);
     let found = pairs.changed.par_iter().map(|pair| weigher.change(pair, &describer));
     let mut changes: Vec<Change> = found.flatten().collect();
@@ -57,10 +61,7 @@ pub fn compare(before: &Side, after: &Side, options: &DiffOptions) -> Result<Dif
     });
     let mark = |&row: &u32| describer.mark(&lights[1][row as usize]);
     let marked = if options.unchanged { pairs.unchanged.as_slice() } else { &[] };
-    let heat = match sides.map(Surveyed::scene) {
-        [Some(before), Some(after)] if options.heat => heat::map([before, after], trees),
-        _ => None,
-    };
+    let heat = scenes.filter(|_| options.heat).and_then(|scenes| heat::map(scenes, trees));
     let [before, after] = names;
     Ok(Diff {
         before,
@@ -87,8 +88,7 @@ fn same([before, after]: [SideName; 2], tally: Tally) -> Diff {
 }
 
 /// What both versions tell: a tree knows neither lights at infinity nor how lights are spread.
-fn comparable<'a>(sides: [&'a Surveyed; 2]) -> [Vec<Light<'a>>; 2] {
-    let both_scenes = sides.iter().all(|side| side.scene().is_some());
+fn comparable<'a>(sides: [&'a Surveyed; 2], both_scenes: bool) -> [Vec<Light<'a>>; 2] {
     sides.map(|side| {
         let mut lights = side.lights();
         if !both_scenes {
@@ -198,9 +198,12 @@ impl<'a> Weigher<'a> {
         };
         let gained = (energy(&pair.after) - energy(&pair.before)).abs();
         let of_energy = if gained > 0.0 { gained / self.total } else { 0.0 };
+        // If it is the same under another name, it is other lights that it lost picks to.
+        let is_renamed_only = pair.verb == Verb::Renamed && differences.is_empty();
+        let of_picks = if is_renamed_only { 0.0 } else { self.moved[pair.number as usize] };
         Some(Change {
             verb: pair.verb,
-            share: of_energy.max(self.moved[pair.number as usize]),
+            share: of_energy.max(of_picks),
             before: before.map(|described| described.card),
             after: after.map(|described| described.card),
             differences,

@@ -11,11 +11,16 @@
 //!
 //! | file | what |
 //! |---|---|
-//! | `card` | one light, described |
-//! | `change` | one light that differs, and each [`Difference`] with its amount |
+//! | `side`, `tree_side`, `scene_side` | a version, opened; what a tree tells, what a scene tells |
+//! | `light`, `profile`, `infinite` | a light as it is matched; its texture and shape; suns and domes |
+//! | `matching`, `pairs` | which light is which, renames among them |
+//! | `card`, `describe` | one light, described |
+//! | `change`, `amounts` | one light that differs, and each [`Difference`] with its amount |
 //! | `totals` | how many lights and how much of them, before and after |
-//! | `picking` | how far the probabilities of picks moved |
+//! | `picking`, `probes` | how far the probabilities of picks moved, and where that is measured |
 //! | `heat` | where in a camera's view direct light changed |
+//! | `compare`, `folder` | all of this of two versions; of all shots in two folders |
+//! | `text`, [`json`] | for people, for programs |
 
 mod amounts;
 mod card;

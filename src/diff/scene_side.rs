@@ -9,6 +9,7 @@ use crate::bounds::{Aabb, LightBounds};
 use crate::emitter::{
     Emitters, InfiniteLight, LightOverflow, LightSource, PosedEmitters, infinite_lights,
 };
+use crate::light_tree::LightRow;
 use crate::pipeline::{self, BuildOptions, Survey};
 use crate::scene::{LightKind, Pose, Scene};
 use crate::store::AlignedBytes;
@@ -89,7 +90,7 @@ impl<'a> SceneSide<'a> {
             shape: None,
             two_sided: false,
             profile: light.profile,
-            placed: false,
+            placed: light.is(LightRow::PLACED),
         };
         let row = match light.row {
             Row::Near(row) => row,
