@@ -1,10 +1,11 @@
 //! The comparison itself.
 
 use super::amounts::differences;
-use super::change::{Change, Verb};
+use super::change::{Apart, Change, Verb};
 use super::describe::Describer;
 use super::heat;
 use super::light::{Light, Profile, Row};
+use super::over_time::apart;
 use super::pairs::{Half, Pair, Pairs};
 use super::picking::{PickingChange, Picks, picking_change};
 use super::probes::{box_around, probes};
@@ -13,6 +14,7 @@ use super::totals::{Tally, Totals};
 use super::{Diff, SideName};
 use crate::light_tree::LightTree;
 use rayon::prelude::*;
+use std::collections::HashMap;
 
 /// What a comparison is to find out besides what changed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -51,7 +53,8 @@ pub fn compare(before: &Side, after: &Side, options: &DiffOptions) -> Result<Dif
     let trees = [&tree_before, &tree_after];
     let (picking, moved) = compare_picking(sides, trees, lights, &pairs);
     let describer = Describer::new(scenes, trees);
-    let weigher = Weigher::new(trees, tallies, &moved);
+    let apart = scenes.map_or_else(HashMap::new, |scenes| apart(scenes, &pairs.changed));
+    let weigher = Weigher::new(trees, tallies, &moved, &apart);
     let found = pairs.changed.par_iter().map(|pair| weigher.change(pair, &describer));
     let mut changes: Vec<Change> = found.flatten().collect();
     changes.par_sort_by(|a, b| {
@@ -164,6 +167,8 @@ struct Weigher<'a> {
     radius2: f64,
     /// By number of the light, the share of picks that it gained or lost.
     moved: &'a [f64],
+    /// By number of the light, how far its versions come apart in time, if they change.
+    apart: &'a HashMap<u32, Apart>,
 }
 
 impl<'a> Weigher<'a> {
@@ -171,11 +176,12 @@ impl<'a> Weigher<'a> {
         trees: [&LightTree<TreeBytes>; 2],
         tallies: [Tally; 2],
         moved: &'a [f64],
+        apart: &'a HashMap<u32, Apart>,
     ) -> Weigher<'a> {
         let radius2 = f64::from((0.5 * box_around(trees).extent()).length_squared());
         let radius2 = if radius2 > 0.0 { radius2 } else { 1.0 };
         let energies = tallies.map(|t| t.energy_cd + t.illuminance_lux * radius2);
-        Weigher { total: energies[0].max(energies[1]), radius2, moved }
+        Weigher { total: energies[0].max(energies[1]), radius2, moved, apart }
     }
 
     /// The change that a pair is; `None` if it is none, looked at closely.
@@ -183,7 +189,9 @@ impl<'a> Weigher<'a> {
         let before = pair.before.as_ref().map(|half| describer.describe(0, half));
         let after = pair.after.as_ref().map(|half| describer.describe(1, half));
         let differences = match (&before, &after) {
-            (Some(before), Some(after)) if !pair.is_renamed_only() => differences(before, after),
+            (Some(before), Some(after)) if !pair.is_renamed_only() => {
+                differences(before, after, self.apart.get(&pair.number).copied())
+            }
             _ => Vec::new(),
         };
         if pair.verb == Verb::Dirtied && differences.is_empty() {

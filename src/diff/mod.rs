@@ -16,6 +16,7 @@
 //! | `matching`, `pairs` | which light is which, renames among them |
 //! | `card`, `describe` | one light, described |
 //! | `change`, `amounts` | one light that differs, and each [`Difference`] with its amount |
+//! | `over_time` | lights that change, followed through the frames |
 //! | `totals` | how many lights and how much of them, before and after |
 //! | `picking`, `probes` | how far the probabilities of picks moved, and where that is measured |
 //! | `heat` | where in a camera's view direct light changed |
@@ -33,6 +34,7 @@ mod infinite;
 pub mod json;
 mod light;
 mod matching;
+mod over_time;
 mod pairs;
 mod picking;
 mod probes;
@@ -44,7 +46,7 @@ mod totals;
 mod tree_side;
 
 pub use card::{Kind, LightCard, Place};
-pub use change::{Change, Difference, Verb};
+pub use change::{Apart, Change, Difference, Verb};
 pub use compare::{DiffOptions, compare};
 pub use folder::{FolderDiff, Outcome, Shot, compare_folders};
 pub use heat::{HeatCell, HeatMap};

@@ -238,15 +238,19 @@ fn what_changes_with_time_is_told() {
     };
     for diff in edited(|scene| scene.lights[POINT].values = Some(keys(10.0))) {
         assert_eq!(aspects(&diff, "point"), ["over_time"]);
-        let over_time = Difference::OverTime { before: false, after: true };
+        let over_time = Difference::OverTime { before: false, after: true, apart: None };
         assert_eq!(only(&diff).differences, [over_time]);
     }
     let [mut before, mut after] = [street(), street()];
     before.lights[POINT].values = Some(keys(10.0));
     after.lights[POINT].values = Some(keys(20.0));
     let found = diff(before, after);
-    let over_time = Difference::OverTime { before: true, after: true };
-    assert_eq!(only(&found).differences, [over_time]);
+    // From 40 to 10 or to 20 in frames 1 to 25: apart in all but the first.
+    let Difference::OverTime { apart: Some(apart), .. } = only(&found).differences[0] else {
+        panic!()
+    };
+    assert_eq!((only(&found).differences.len(), apart.frames, apart.most_moved_m), (1, 24, 0.0));
+    assert!(is_near(apart.most_stops, 1.0));
     // The same end by another way.
     let [mut before, mut after] = [street(), street()];
     let way = |x: f32| {
@@ -258,7 +262,13 @@ fn what_changes_with_time_is_told() {
     };
     node(&mut before, "panel").channels.push(way(7.0));
     node(&mut after, "panel").channels.push(way(5.0));
-    assert_eq!(aspects(&diff(before, after), "panel"), ["over_time"]);
+    let found = diff(before, after);
+    assert_eq!(aspects(&found, "panel"), ["over_time"]);
+    let Difference::OverTime { apart: Some(apart), .. } = only(&found).differences[0] else {
+        panic!()
+    };
+    assert_eq!((apart.frames, apart.most_stops), (24, 0.0));
+    assert!(is_near(apart.most_moved_m, 2.0));
 }
 
 #[test]
