@@ -21,7 +21,7 @@ impl<'a> Describer<'a> {
     ) -> Describer<'a> {
         match scenes {
             Some(scenes) => Describer::Scenes(scenes),
-            None => Describer::Trees(trees.map(|tree| Places::find(tree))),
+            None => Describer::Trees(trees.map(Places::find)),
         }
     }
 

@@ -1,6 +1,6 @@
 //! Floor 6: what changed between two versions of a scene, as far as its light goes.
 //!
-//! A version is a [`Side`]: a scene, or the tree file that was built from it. [`compare`] matches the
+//! A version is a [`Side`]: a scene, or the tree file that was built from it. [`compare()`] matches the
 //! lights of both and says which were added, removed, dirtied or renamed, of the dirtied *what*
 //! changed and *by how much*, and what that does to picking. Prims that send no light are not
 //! compared; where they change what the camera sees of the lights, the [`HeatMap`] shows it.

@@ -1,8 +1,8 @@
 //! What holds of every comparison.
 
-use crate::street::{diff, node, only, put, street, tree_of, with_camera};
+use crate::street::{SPHERE, diff, node, only, put, street, tree_of, with_camera};
 use candelabra::diff::{Change, Diff, DiffOptions, Difference, ProbePlaces, Side, Verb, compare};
-use candelabra::scene::{Light, LightKind, Scene};
+use candelabra::scene::{Channel, Interpolation, Keys, Light, LightKind, Scene};
 use glam::Vec3;
 use proptest::prelude::*;
 use tempfile::TempDir;
@@ -244,6 +244,24 @@ fn a_tree_and_its_scene_are_the_same_and_two_trees_as_two_scenes() {
     assert_eq!(told(&compare(&trees[0], &trees[1])), of_scenes);
     assert_eq!(told(&compare(&trees[0], &scenes[1])), of_scenes);
     assert_eq!(told(&compare(&scenes[0], &trees[1])), of_scenes);
+
+    // Of trees in trees, of frames, of forced lights too.
+    let shot = |to: f32| {
+        let mut scene = street();
+        for name in ["panel", "bulb_1"] {
+            let values = vec![Vec3::ZERO, Vec3::new(to, 2.0, 0.0)];
+            let (times_s, interpolation) = (vec![0.0, 0.2], Interpolation::Linear);
+            let keys = Keys { times_s, values, interpolation };
+            node(&mut scene, name).channels.push(Channel::Translation(keys));
+        }
+        scene.lights[SPHERE].forced = true;
+        scene
+    };
+    let tree = tree_of(&shot(3.0), &folder, "moving.ltree");
+    assert!(compare(&tree, &Side::of_scene(shot(3.0))).is_same());
+    let found = compare(&tree, &Side::of_scene(shot(4.0)));
+    let aspects = found.changes.iter().map(|c| c.differences.iter().map(Difference::aspect));
+    assert_eq!(aspects.flatten().collect::<Vec<_>>(), ["over_time"; 2], "{found:#?}");
 
     // A tree does not know that a prim is there and dark.
     let mut off = row(&[]);
