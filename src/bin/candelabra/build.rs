@@ -79,7 +79,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     )?;
     // The output as it is: up to date, or what the new one is built upon.
     let before = if arguments.force { None } else { Base::open(&output).ok() };
-    if before.as_ref().is_some_and(|before| before.tree.fingerprint() == survey.fingerprint) {
+    if before.as_ref().is_some_and(|before| pipeline::is_built_from(&before.tree, &survey)) {
         writeln!(out, "{}: up to date", output.display())?;
         return Ok(());
     }
