@@ -30,7 +30,7 @@ pub(super) fn spell(frames: &[i32]) -> String {
     let step = |pair: &[i32]| i64::from(pair[1]) - i64::from(pair[0]);
     let mut steps = frames.windows(2).map(step);
     match (frames, steps.next()) {
-        ([first, .., last], Some(by)) if steps.all(|step| step == by) => match by {
+        ([first, _, .., last], Some(by)) if steps.all(|step| step == by) => match by {
             1 => format!("{first}-{last}"),
             _ => format!("{first}-{last}x{by}"),
         },
