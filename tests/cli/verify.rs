@@ -19,9 +19,9 @@ fn it_says_of_each_file_what_it_is() {
     // The worst decides, and none keeps the others from being looked at.
     shot.candelabra("verify table.ltree path.ltree text.ltree shot.ltree")
         .ends(1)
-        .says("table.ltree: unsound: HEAD 5: ")
-        .says("path.ltree: unsound: TABL 10: section PATH is damaged")
-        .says("text.ltree: unsound: HEAD 1: ")
+        .says("table.ltree: unsound: rule HEAD 5: ")
+        .says("path.ltree: unsound: rule TABL 10: section PATH is damaged")
+        .says("text.ltree: unsound: rule HEAD 1: ")
         .says("shot.ltree: sound");
     shot.candelabra("verify absent.ltree path.ltree")
         .ends(2)
@@ -43,5 +43,5 @@ fn it_names_the_first_broken_rule() {
     shot.write("golden.ltree", std::fs::read(golden).unwrap());
     shot.candelabra("verify golden.ltree")
         .ends(1)
-        .says("golden.ltree: unsound: LGHT 1: section LGHT, row 2 breaks rule LGHT 1: its emitters follow");
+        .says("golden.ltree: unsound: section LGHT, row 2 breaks rule LGHT 1: its emitters follow");
 }

@@ -2,6 +2,7 @@
 
 use anyhow::Result;
 use candelabra::pipeline::{self, OpenedTree, TreeError};
+use candelabra::store::StoreError;
 use clap::Args;
 use std::io::Write;
 use std::path::PathBuf;
@@ -35,8 +36,12 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
                 0
             }
             Err(TreeError::Broken { cause, .. }) => {
-                let rule = cause.violation().rule;
-                writeln!(out, "{name}: unsound: {rule}: {cause}")?;
+                match cause {
+                    StoreError::Broken(violation) => writeln!(out, "{name}: unsound: {violation}")?,
+                    _ => {
+                        writeln!(out, "{name}: unsound: rule {}: {cause}", cause.violation().rule)?
+                    }
+                }
                 UNSOUND
             }
             Err(error) => {
