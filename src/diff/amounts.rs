@@ -1,6 +1,6 @@
 //! In what two versions of a light differ, and by how much.
 
-use super::change::Difference;
+use super::change::{Apart, Difference};
 use super::light::Described;
 use crate::math::angle;
 use glam::{DMat3, DVec3, Vec3};
@@ -18,13 +18,18 @@ const LEAST_ENERGY: f32 = 1e-4;
 
 /// All that differs between two versions of a light that are known to differ. Empty if only the form
 /// in which they are told does: another instance of a mesh gives it a tree of its own.
-pub(super) fn differences(before: &Described, after: &Described) -> Vec<Difference> {
+pub(super) fn differences(
+    before: &Described,
+    after: &Described,
+    apart: Option<Apart>,
+) -> Vec<Difference> {
     let (a, b) = (&before.card, &after.card);
     let in_other_form = before.placed != after.placed;
     // Of a light that is off, only the prim is known.
     let both_lit = a.energy > 0.0 && b.energy > 0.0;
+    let looks_told = a.kind.is_some() && b.kind.is_some();
     let mut found = Vec::new();
-    if a.kind != b.kind {
+    if a.kind != b.kind && looks_told {
         found.push(Difference::Kind { before: a.kind, after: b.kind });
     }
     let tells_place = !in_other_form || before.shape.is_some();
@@ -39,7 +44,7 @@ pub(super) fn differences(before: &Described, after: &Described) -> Vec<Differen
         let stops = both_lit.then(|| (b.energy / a.energy).log2());
         found.push(Difference::Energy { before: a.energy, after: b.energy, stops });
     }
-    if a.color != b.color && both_lit {
+    if a.color != b.color && looks_told && both_lit {
         found.push(Difference::Color { before: a.color, after: b.color });
     }
     if tells_place && both_lit && (a.half_angle_deg - b.half_angle_deg).abs() > LEAST_CONE_DEG {
@@ -52,14 +57,29 @@ pub(super) fn differences(before: &Described, after: &Described) -> Vec<Differen
     if a.forced != b.forced {
         found.push(Difference::Forced { before: a.forced, after: b.forced });
     }
-    if a.changes != b.changes || (a.changes && found.is_empty()) {
-        found.push(Difference::OverTime { before: a.changes, after: b.changes });
+    let goes_on = apart.is_some_and(|apart| exceeds(&apart, &found));
+    if (both_lit && a.changes != b.changes) || (a.changes && found.is_empty()) || goes_on {
+        found.push(Difference::OverTime { before: a.changes, after: b.changes, apart });
     }
-    let respread = both_lit && before.profile.pattern != after.profile.pattern;
+    // What has become another kind has another profile.
+    let respread = both_lit && a.kind == b.kind && before.profile.pattern != after.profile.pattern;
     if respread || (found.is_empty() && !in_other_form) {
         found.push(Difference::Pattern);
     }
     found
+}
+
+/// Whether two versions come clearly farther apart in time than they are in the first frame.
+fn exceeds(apart: &Apart, at_first: &[Difference]) -> bool {
+    let (mut moved, mut in_stops) = (0.0, 0.0);
+    for difference in at_first {
+        match *difference {
+            Difference::Transform { moved_m, .. } => moved = moved_m,
+            Difference::Energy { stops, .. } => in_stops = stops.unwrap_or(f32::INFINITY).abs(),
+            _ => {}
+        }
+    }
+    apart.most_moved_m > 1.01 * moved + 1e-4 || apart.most_stops > 1.01 * in_stops + 1e-2
 }
 
 fn transform(before: &Described, after: &Described) -> Option<Difference> {

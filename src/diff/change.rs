@@ -98,16 +98,29 @@ pub enum Difference {
         /// Metres after; `None` is physical.
         after_m: Option<f32>,
     },
-    /// What it does in time.
+    /// What it does in time, beyond what differs in the first frame.
     OverTime {
         /// Whether it changes before.
         before: bool,
         /// Whether it changes after.
         after: bool,
+        /// How far apart the versions come, where it changes in both of two scenes.
+        apart: Option<Apart>,
     },
     /// How its light is spread: the texture of its emission, its profile within the cone, the shares
     /// of its emitters. All that the other amounts do not tell.
     Pattern,
+}
+
+/// How far apart two versions of a light come in the course of time.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Apart {
+    /// In how many frames they differ.
+    pub frames: u32,
+    /// How far their places are apart at most, metres.
+    pub most_moved_m: f32,
+    /// How far their strengths are apart at most, stops; infinite where one is dark.
+    pub most_stops: f32,
 }
 
 impl Change {

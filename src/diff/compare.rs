@@ -1,10 +1,11 @@
 //! The comparison itself.
 
 use super::amounts::differences;
-use super::change::{Change, Verb};
+use super::change::{Apart, Change, Verb};
 use super::describe::Describer;
 use super::heat;
 use super::light::{Light, Profile, Row};
+use super::over_time::apart;
 use super::pairs::{Half, Pair, Pairs};
 use super::picking::{PickingChange, Picks, picking_change};
 use super::probes::{box_around, probes};
@@ -13,6 +14,7 @@ use super::totals::{Tally, Totals};
 use super::{Diff, SideName};
 use crate::light_tree::LightTree;
 use rayon::prelude::*;
+use std::collections::HashMap;
 
 /// What a comparison is to find out besides what changed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -35,9 +37,13 @@ pub fn compare(before: &Side, after: &Side, options: &DiffOptions) -> Result<Dif
     if sides[0].has_rows_of(sides[1]) && !looks_closer {
         return Ok(same(names, tally(&sides[0].lights())));
     }
-    let [lights_before, lights_after] = comparable(sides);
+    let scenes = match sides.map(Surveyed::scene) {
+        [Some(before), Some(after)] => Some([before, after]),
+        _ => None,
+    };
+    let [lights_before, lights_after] = comparable(sides, scenes.is_some());
     let lights = [lights_before.as_slice(), lights_after.as_slice()];
-    let pairs = Pairs::of(sides, lights);
+    let pairs = Pairs::of(scenes, lights);
     let tallies = lights.map(tally);
     let is_same = sides[0].fingerprint() == sides[1].fingerprint() && pairs.changed.is_empty();
     if is_same && !looks_closer {
@@ -46,8 +52,9 @@ pub fn compare(before: &Side, after: &Side, options: &DiffOptions) -> Result<Dif
     let (tree_before, tree_after) = rayon::join(|| sides[0].tree(), || sides[1].tree());
     let trees = [&tree_before, &tree_after];
     let (picking, moved) = compare_picking(sides, trees, lights, &pairs);
-    let describer = Describer::new(sides, trees);
-    let weigher = Weigher::new(trees, tallies, &moved);
+    let describer = Describer::new(scenes, trees);
+    let apart = scenes.map_or_else(HashMap::new, |scenes| apart(scenes, &pairs.changed));
+    let weigher = Weigher::new(trees, tallies, &moved, &apart);
     let found = pairs.changed.par_iter().map(|pair| weigher.change(pair, &describer));
     let mut changes: Vec<Change> = found.flatten().collect();
     changes.par_sort_by(|a, b| {
@@ -57,10 +64,7 @@ pub fn compare(before: &Side, after: &Side, options: &DiffOptions) -> Result<Dif
     });
     let mark = |&row: &u32| describer.mark(&lights[1][row as usize]);
     let marked = if options.unchanged { pairs.unchanged.as_slice() } else { &[] };
-    let heat = match sides.map(Surveyed::scene) {
-        [Some(before), Some(after)] if options.heat => heat::map([before, after], trees),
-        _ => None,
-    };
+    let heat = scenes.filter(|_| options.heat).and_then(|scenes| heat::map(scenes, trees));
     let [before, after] = names;
     Ok(Diff {
         before,
@@ -87,8 +91,7 @@ fn same([before, after]: [SideName; 2], tally: Tally) -> Diff {
 }
 
 /// What both versions tell: a tree knows neither lights at infinity nor how lights are spread.
-fn comparable<'a>(sides: [&'a Surveyed; 2]) -> [Vec<Light<'a>>; 2] {
-    let both_scenes = sides.iter().all(|side| side.scene().is_some());
+fn comparable<'a>(sides: [&'a Surveyed; 2], both_scenes: bool) -> [Vec<Light<'a>>; 2] {
     sides.map(|side| {
         let mut lights = side.lights();
         if !both_scenes {
@@ -164,6 +167,8 @@ struct Weigher<'a> {
     radius2: f64,
     /// By number of the light, the share of picks that it gained or lost.
     moved: &'a [f64],
+    /// By number of the light, how far its versions come apart in time, if they change.
+    apart: &'a HashMap<u32, Apart>,
 }
 
 impl<'a> Weigher<'a> {
@@ -171,11 +176,12 @@ impl<'a> Weigher<'a> {
         trees: [&LightTree<TreeBytes>; 2],
         tallies: [Tally; 2],
         moved: &'a [f64],
+        apart: &'a HashMap<u32, Apart>,
     ) -> Weigher<'a> {
         let radius2 = f64::from((0.5 * box_around(trees).extent()).length_squared());
         let radius2 = if radius2 > 0.0 { radius2 } else { 1.0 };
         let energies = tallies.map(|t| t.energy_cd + t.illuminance_lux * radius2);
-        Weigher { total: energies[0].max(energies[1]), radius2, moved }
+        Weigher { total: energies[0].max(energies[1]), radius2, moved, apart }
     }
 
     /// The change that a pair is; `None` if it is none, looked at closely.
@@ -183,7 +189,9 @@ impl<'a> Weigher<'a> {
         let before = pair.before.as_ref().map(|half| describer.describe(0, half));
         let after = pair.after.as_ref().map(|half| describer.describe(1, half));
         let differences = match (&before, &after) {
-            (Some(before), Some(after)) if !pair.is_renamed_only() => differences(before, after),
+            (Some(before), Some(after)) if !pair.is_renamed_only() => {
+                differences(before, after, self.apart.get(&pair.number).copied())
+            }
             _ => Vec::new(),
         };
         if pair.verb == Verb::Dirtied && differences.is_empty() {
@@ -198,9 +206,12 @@ impl<'a> Weigher<'a> {
         };
         let gained = (energy(&pair.after) - energy(&pair.before)).abs();
         let of_energy = if gained > 0.0 { gained / self.total } else { 0.0 };
+        // If it is the same under another name, it is other lights that it lost picks to.
+        let is_renamed_only = pair.verb == Verb::Renamed && differences.is_empty();
+        let of_picks = if is_renamed_only { 0.0 } else { self.moved[pair.number as usize] };
         Some(Change {
             verb: pair.verb,
-            share: of_energy.max(self.moved[pair.number as usize]),
+            share: of_energy.max(of_picks),
             before: before.map(|described| described.card),
             after: after.map(|described| described.card),
             differences,

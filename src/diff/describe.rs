@@ -4,7 +4,7 @@ use super::Mark;
 use super::light::{Described, Light};
 use super::pairs::Half;
 use super::scene_side::SceneSide;
-use super::side::{Surveyed, TreeBytes};
+use super::side::TreeBytes;
 use super::tree_side::Places;
 use crate::light_tree::LightTree;
 
@@ -16,12 +16,12 @@ pub(super) enum Describer<'a> {
 
 impl<'a> Describer<'a> {
     pub fn new(
-        sides: [&'a Surveyed<'a>; 2],
+        scenes: Option<[&'a SceneSide<'a>; 2]>,
         trees: [&'a LightTree<TreeBytes<'a>>; 2],
     ) -> Describer<'a> {
-        match sides.map(|side| side.scene()) {
-            [Some(before), Some(after)] => Describer::Scenes([before, after]),
-            _ => Describer::Trees(trees.map(|tree| Places::find(tree))),
+        match scenes {
+            Some(scenes) => Describer::Scenes(scenes),
+            None => Describer::Trees(trees.map(Places::find)),
         }
     }
 

@@ -61,16 +61,23 @@ impl Light<'_> {
     pub fn has_content_of(&self, other: &Light) -> bool {
         self.fingerprint == other.fingerprint
             && self.class == other.class
-            && self.look() == other.look()
+            && self.looks_like(other)
             && self.profile == other.profile
     }
 
-    fn look(&self) -> (Option<Kind>, [u16; 3]) {
-        (self.kind, self.color)
+    /// An old tree file does not tell, and then nothing differs.
+    fn looks_like(&self, other: &Light) -> bool {
+        let told = self.kind.is_some() && other.kind.is_some();
+        !told || (self.kind, self.color) == (other.kind, other.color)
     }
 
     pub fn is(&self, property: u32) -> bool {
         self.class & property != 0
+    }
+
+    /// Whether it moves or its strength varies with time.
+    pub fn changes(&self) -> bool {
+        self.is(LightRow::CHANGES)
     }
 
     /// What a card of it says before it is known where the light is.
@@ -86,9 +93,14 @@ impl Light<'_> {
             half_angle_deg: 180.0,
             range_m: None,
             forced: self.is(LightRow::FORCED),
-            changes: self.is(LightRow::CHANGES),
+            changes: self.changes(),
         }
     }
+}
+
+/// What a tree says of a light that is dark in its first frame is not quite nothing.
+pub(super) fn without_crumbs(energy: f32) -> f32 {
+    if energy < 1e-30 { 0.0 } else { energy }
 }
 
 /// The kind that a tree's row tells.

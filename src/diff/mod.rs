@@ -1,6 +1,6 @@
 //! Floor 6: what changed between two versions of a scene, as far as its light goes.
 //!
-//! A version is a [`Side`]: a scene, or the tree file that was built from it. [`compare`] matches the
+//! A version is a [`Side`]: a scene, or the tree file that was built from it. [`compare()`] matches the
 //! lights of both and says which were added, removed, dirtied or renamed, of the dirtied *what*
 //! changed and *by how much*, and what that does to picking. Prims that send no light are not
 //! compared; where they change what the camera sees of the lights, the [`HeatMap`] shows it.
@@ -11,12 +11,17 @@
 //!
 //! | file | what |
 //! |---|---|
-//! | `card` | one light, described |
-//! | `change` | one light that differs, and each [`Difference`] with its amount |
+//! | `side`, `tree_side`, `scene_side` | a version, opened; what a tree tells, what a scene tells |
+//! | `light`, `profile`, `infinite` | a light as it is matched; its texture and shape; suns and domes |
+//! | `matching`, `pairs` | which light is which, renames among them |
+//! | `card`, `describe` | one light, described |
+//! | `change`, `amounts` | one light that differs, and each [`Difference`] with its amount |
+//! | `over_time` | lights that change, followed through the frames |
 //! | `totals` | how many lights and how much of them, before and after |
-//! | `picking` | how far the probabilities of picks moved |
+//! | `picking`, `probes` | how far the probabilities of picks moved, and where that is measured |
 //! | `heat` | where in a camera's view direct light changed |
-//! | `html` | a comparison as a page |
+//! | `compare`, `folder` | all of this of two versions; of all shots in two folders |
+//! | `text`, [`json`], `html` | for people, for programs, as a page |
 
 mod amounts;
 mod card;
@@ -30,6 +35,7 @@ mod infinite;
 pub mod json;
 mod light;
 mod matching;
+mod over_time;
 mod pairs;
 mod picking;
 mod probes;
@@ -41,7 +47,7 @@ mod totals;
 mod tree_side;
 
 pub use card::{Kind, LightCard, Place};
-pub use change::{Change, Difference, Verb};
+pub use change::{Apart, Change, Difference, Verb};
 pub use compare::{DiffOptions, compare};
 pub use folder::{FolderDiff, Outcome, Shot, compare_folders};
 pub use heat::{HeatCell, HeatMap};

@@ -3,8 +3,8 @@
 use super::change::Verb;
 use super::light::Light;
 use super::matching::matching;
-use super::scene_side::Dark;
-use super::side::Surveyed;
+use super::scene_side::{Dark, SceneSide};
+use std::collections::HashMap;
 
 /// A light of one version, or a prim that might be one and is dark.
 #[derive(Clone, Copy, Debug)]
@@ -45,7 +45,11 @@ pub(super) struct Pairs<'a> {
 }
 
 impl<'a> Pairs<'a> {
-    pub fn of(sides: [&'a Surveyed; 2], [before, after]: [&[Light<'a>]; 2]) -> Pairs<'a> {
+    /// Pairs them; `scenes` only if both versions are.
+    pub fn of(
+        scenes: Option<[&'a SceneSide<'a>; 2]>,
+        [before, after]: [&[Light<'a>]; 2],
+    ) -> Pairs<'a> {
         let found = matching(before, after);
         let count = before.len() + found.added.len();
         let mut pairs = Pairs {
@@ -70,25 +74,21 @@ impl<'a> Pairs<'a> {
             }
         }
         // A light that one scene lacks may be there as a prim that is dark: then it was switched.
-        let dark = |side: usize, only: &[u32]| match sides[side].scene() {
-            Some(scene) if !only.is_empty() => scene.dark_prims(),
-            _ => Default::default(),
+        let dark = |side: usize, only: &[u32]| match scenes {
+            Some(scenes) if !only.is_empty() => scenes[side].dark_prims(),
+            _ => HashMap::new(),
         };
         let (dark_before, dark_after) = (dark(0, &found.added), dark(1, &found.removed));
-        let verb =
-            |other: &Option<Half>, alone| if other.is_some() { Verb::Dirtied } else { alone };
         for &row in &found.removed {
             let light = before[row as usize];
-            let after =
-                dark_after.get_key_value(light.path).map(|(path, dark)| Half::Dark(path, *dark));
-            let verb = verb(&after, Verb::Removed);
+            let after = dark_after.get(light.path).map(|&dark| Half::Dark(light.path, dark));
+            let verb = if after.is_some() { Verb::Dirtied } else { Verb::Removed };
             pairs.changed.push(Pair { verb, before: Some(Half::Lit(light)), after, number: row });
         }
         for &row in &found.added {
             let light = after[row as usize];
-            let before =
-                dark_before.get_key_value(light.path).map(|(path, dark)| Half::Dark(path, *dark));
-            let verb = verb(&before, Verb::Added);
+            let before = dark_before.get(light.path).map(|&dark| Half::Dark(light.path, dark));
+            let verb = if before.is_some() { Verb::Dirtied } else { Verb::Added };
             let number = pairs.number_of_after[row as usize];
             pairs.changed.push(Pair { verb, before, after: Some(Half::Lit(light)), number });
         }

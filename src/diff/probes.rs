@@ -23,7 +23,7 @@ pub(super) fn on_camera_paths<D: AsRef<[u8]> + Sync>(
     let camera = pipeline::find_camera(side.scene, None).ok()?.clone();
     let settings = RenderSettings { width: PICTURE, height: PICTURE, ..Default::default() };
     let delegate = RenderDelegate::new(side.scene, &side.emitters, tree, camera, settings);
-    let found = delegate.at_frame(side.frame, |integrator| {
+    let found = delegate.at_frame(side.frame(), |integrator| {
         (0..PROBES).filter_map(|i| visited(integrator, i, PROBES, 0)).map(|v| v.receiver).collect()
     });
     found.ok().filter(|found: &Vec<Receiver>| !found.is_empty())

@@ -2,13 +2,14 @@
 
 use super::card::{Kind, LightCard};
 use super::infinite::{self, Infinite};
-use super::light::{Described, Light, Profile, Row, kind_of};
+use super::light::{Described, Light, Profile, Row, kind_of, without_crumbs};
 use super::profile::Profiles;
 use super::tree_side::place;
 use crate::bounds::{Aabb, LightBounds};
 use crate::emitter::{
     Emitters, InfiniteLight, LightOverflow, LightSource, PosedEmitters, infinite_lights,
 };
+use crate::light_tree::LightRow;
 use crate::pipeline::{self, BuildOptions, Survey};
 use crate::scene::{LightKind, Pose, Scene};
 use crate::store::AlignedBytes;
@@ -21,9 +22,9 @@ pub(super) struct SceneSide<'a> {
     pub emitters: Emitters,
     /// Of all frames, but with the bounds of the first alone.
     pub survey: Survey,
-    /// The first frame.
-    pub frame: i32,
-    /// In that frame.
+    /// The frames.
+    pub frames: Vec<i32>,
+    /// In the first frame.
     pub pose: Pose,
     profiles: Profiles,
     infinite: Vec<Infinite>,
@@ -37,10 +38,25 @@ impl<'a> SceneSide<'a> {
         let emitters = Emitters::collect(scene);
         let mut survey = pipeline::survey(scene, &emitters, &frames)?;
         survey.frames.truncate(1);
-        let pose = scene.pose_at(scene.timeline.seconds_at(f64::from(frames[0])));
+        let pose = pose_at(scene, frames[0]);
         let profiles = Profiles::of(scene, &emitters);
         let infinite = infinite::find(scene, &pose, &frames);
-        Ok(SceneSide { scene, emitters, survey, frame: frames[0], pose, profiles, infinite })
+        Ok(SceneSide { scene, emitters, survey, frames, pose, profiles, infinite })
+    }
+
+    /// The first frame.
+    pub fn frame(&self) -> i32 {
+        self.frames[0]
+    }
+
+    /// Where everything is in a frame.
+    pub fn pose_at(&self, frame: i32) -> Pose {
+        pose_at(self.scene, frame)
+    }
+
+    /// The row in the scene of a light at infinity.
+    pub fn infinite_row(&self, row: u32) -> u32 {
+        self.infinite[row as usize].light
     }
 
     /// The tree of the first frame.
@@ -68,7 +84,7 @@ impl<'a> SceneSide<'a> {
             class: summary.class,
             kind: kind_of(&summary.look),
             color: summary.look.color,
-            energy: summary.energy,
+            energy: without_crumbs(summary.energy),
             emitters: summary.emitter_count,
             profile: self.profiles.of_light(self.scene, entry.source),
         });
@@ -89,12 +105,12 @@ impl<'a> SceneSide<'a> {
             shape: None,
             two_sided: false,
             profile: light.profile,
-            placed: false,
+            placed: light.is(LightRow::PLACED),
         };
         let row = match light.row {
             Row::Near(row) => row,
             Row::Infinite(row) => {
-                let node = self.scene.lights[self.infinite[row as usize].light as usize].node;
+                let node = self.scene.lights[self.infinite_row(row) as usize].node;
                 let to_world = self.pose.world(node);
                 described.to_world = Some(to_world);
                 if let Some(half_angle) = light.profile.half_angle_rad {
@@ -182,6 +198,10 @@ impl<'a> SceneSide<'a> {
             placed: false,
         }
     }
+}
+
+fn pose_at(scene: &Scene, frame: i32) -> Pose {
+    scene.pose_at(scene.timeline.seconds_at(f64::from(frame)))
 }
 
 /// A prim that might shine and does not.

@@ -110,8 +110,8 @@ pub(super) fn is_tree_file(path: &Path) -> bool {
 
 /// A version whose lights are known.
 pub(super) enum Surveyed<'a> {
-    Tree(TreeSide<'a>),
-    Scene(SceneSide<'a>),
+    Tree(Box<TreeSide<'a>>),
+    Scene(Box<SceneSide<'a>>),
 }
 
 /// The bytes of a tree: of a file, or just built.
@@ -136,12 +136,12 @@ impl<'a> Surveyed<'a> {
         let frames = trees.iter().flatten().map(TreeSide::frames).find(|frames| !frames.is_empty());
         let survey = |side: &'a Side, tree: Option<TreeSide<'a>>| {
             if let Some(tree) = tree {
-                return Ok(Surveyed::Tree(tree));
+                return Ok(Surveyed::Tree(Box::new(tree)));
             }
             let scene = side.scene().expect("what is no tree is a scene");
             let surveyed = SceneSide::survey(scene, frames.as_deref());
             surveyed
-                .map(Surveyed::Scene)
+                .map(|scene| Surveyed::Scene(Box::new(scene)))
                 .map_err(|cause| SideError::Overflow { path: scene.source.clone(), cause })
         };
         let [tree_before, tree_after] = trees;

@@ -4,7 +4,7 @@
 //! what they bound. A light with a tree of its own has a transform too.
 
 use super::card::{LightCard, Place};
-use super::light::{Described, Light, Profile, Row, kind_of};
+use super::light::{Described, Light, Profile, Row, kind_of, without_crumbs};
 use crate::bounds::{Cone, LightBounds};
 use crate::light_tree::{InstanceRow, LightRow, LightTree, Link, Node, TreeKind, TreeRow};
 use glam::{Affine3A, Mat3, Vec3};
@@ -60,7 +60,7 @@ fn of_row<'a, D: AsRef<[u8]>>(tree: &'a LightTree<D>, row: u32, light: &'a Light
         class: light.class,
         kind: kind_of(&light.look),
         color: light.look.color,
-        energy: light.energy,
+        energy: without_crumbs(light.energy),
         emitters: light.emitter_count,
         profile: Profile::default(),
     }

@@ -19,6 +19,7 @@ pub use content::scene_fingerprint;
 pub use forced::{NoLightThere, force_lights};
 pub use frames::frames_of;
 pub use fresh::{OpenedTree, StaleTree, TreeError, check_fresh, open_tree};
+pub use look::is_built_from;
 pub use survey::{Group, PlacedLight, SharedBounds, Survey, survey};
 
 use crate::ingest::{self, IngestError};

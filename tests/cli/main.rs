@@ -1,6 +1,7 @@
 //! The two programs, as a pipeline TD and a farm use them.
 
 mod build;
+mod diff;
 mod files;
 mod inspect;
 mod lights;

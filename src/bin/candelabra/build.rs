@@ -97,7 +97,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
 
 /// Whether the output is a sound tree of just this content.
 fn is_up_to_date(output: &Path, survey: &Survey) -> bool {
-    pipeline::open_tree(output, true).is_ok_and(|tree| tree.fingerprint() == survey.fingerprint)
+    pipeline::open_tree(output, true).is_ok_and(|tree| pipeline::is_built_from(&tree, survey))
 }
 
 fn report(

@@ -80,7 +80,17 @@ fn amount(difference: &Difference, infinite: bool) -> String {
         Difference::Forced { after, .. } => {
             if after { "now forced" } else { "no longer forced" }.into()
         }
-        Difference::OverTime { before, after } => match (before, after) {
+        Difference::OverTime { apart: Some(apart), .. } => {
+            let parts = [
+                (apart.most_moved_m > 0.0).then(|| format!("{} m", short(apart.most_moved_m))),
+                (apart.most_stops > 0.0).then(|| format!("{:.2} stops", apart.most_stops)),
+            ];
+            let parts: Vec<String> = parts.into_iter().flatten().collect();
+            let by = if parts.is_empty() { "" } else { ", up to " };
+            let frames = counted(apart.frames as usize, "frame");
+            format!("over time: differs in {frames}{by}{}", parts.join(" and "))
+        }
+        Difference::OverTime { before, after, .. } => match (before, after) {
             (false, true) => "now changes with time",
             (true, false) => "no longer changes with time",
             _ => "changes otherwise with time",

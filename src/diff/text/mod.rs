@@ -72,8 +72,8 @@ impl Text<'_, Diff> {
                 Verb::Dirtied => "dirtied",
                 Verb::Renamed => "renamed",
             };
-            let (share, path) = (100.0 * change.share, change.path());
-            let line = format!("  {share:>6.2} %  {verb:<7}  {path:<width$}  {}", details(change));
+            let (share, path) = (percent(change.share), change.path());
+            let line = format!("  {share:>6} %  {verb:<7}  {path:<width$}  {}", details(change));
             writeln!(f, "{}", line.trim_end())?;
         }
         match changes.len() - listed.len() {
@@ -107,6 +107,11 @@ impl fmt::Display for Text<'_, FolderDiff> {
     }
 }
 
+/// In two decimals; what is there is not called nothing.
+fn percent(share: f64) -> String {
+    if share > 0.0 && share < 5e-5 { "<0.01".into() } else { format!("{:.2}", 100.0 * share) }
+}
+
 fn from_to(before: usize, after: usize) -> String {
     match before == after {
         true => Count(after).to_string(),
@@ -131,10 +136,10 @@ fn moved(picking: &PickingChange) -> String {
         ProbePlaces::BoxAroundLights => "around the lights",
     };
     format!(
-        "{:.2} % go to other lights in the mean over {} {places}, {:.2} % at worst, at {}",
-        100.0 * picking.mean,
+        "{} % go to other lights in the mean over {} {places}, {} % at worst, at {}",
+        percent(picking.mean),
         counted(picking.probes, "point"),
-        100.0 * picking.worst,
+        percent(picking.worst),
         Triple(picking.worst_at_m)
     )
 }

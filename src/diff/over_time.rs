@@ -1,0 +1,95 @@
+//! Lights that change, followed through the frames of two scenes.
+
+use super::change::Apart;
+use super::light::{Light, Row};
+use super::pairs::{Half, Pair};
+use super::scene_side::SceneSide;
+use crate::bounds::Aabb;
+use crate::emitter::LightSource;
+use crate::math::color::luminance;
+use crate::scene::Pose;
+use glam::{Affine3A, Vec3};
+use rayon::prelude::*;
+use std::collections::{BTreeSet, HashMap};
+
+/// What changes of a light.
+#[derive(Clone, Copy)]
+struct Animated {
+    node: u32,
+    /// Middle of its emitters in its own space.
+    middle: Vec3,
+    strength: Strength,
+}
+
+#[derive(Clone, Copy)]
+enum Strength {
+    Light(u32),
+    Instance(u32),
+}
+
+/// Of pairs that change in both scenes, by their numbers: over the frames of either, one pose at a time.
+pub(super) fn apart(scenes: [&SceneSide; 2], pairs: &[Pair]) -> HashMap<u32, Apart> {
+    let animated: Vec<(u32, [Animated; 2])> = pairs
+        .iter()
+        .filter_map(|pair| match (&pair.before, &pair.after) {
+            (Some(Half::Lit(a)), Some(Half::Lit(b))) if a.changes() && b.changes() => {
+                Some((pair.number, [animated(scenes[0], a), animated(scenes[1], b)]))
+            }
+            _ => None,
+        })
+        .collect();
+    let mut found = vec![Apart::default(); animated.len()];
+    let frames: BTreeSet<i32> = match animated.is_empty() {
+        true => BTreeSet::new(),
+        false => scenes.iter().flat_map(|side| side.frames.iter().copied()).collect(),
+    };
+    for frame in frames {
+        let poses = scenes.map(|side| side.pose_at(frame));
+        found.par_iter_mut().zip(&animated).for_each(|(apart, (_, lights))| {
+            let [a, b] = [0, 1].map(|side| lights[side].at(scenes[side], &poses[side]));
+            if a == b {
+                return;
+            }
+            apart.frames += 1;
+            let moved = (a.0.transform_point3(lights[0].middle))
+                .distance(b.0.transform_point3(lights[1].middle));
+            apart.most_moved_m = apart.most_moved_m.max(moved);
+            let stops = (luminance(b.1) / luminance(a.1)).log2().abs();
+            // Dark in both is no difference.
+            apart.most_stops = apart.most_stops.max(if stops.is_nan() { 0.0 } else { stops });
+        });
+    }
+    animated.iter().map(|(number, _)| *number).zip(found).collect()
+}
+
+fn animated(side: &SceneSide, light: &Light) -> Animated {
+    let SceneSide { scene, emitters, .. } = side;
+    let source = match light.row {
+        Row::Near(row) => emitters.lights()[row as usize].source,
+        Row::Infinite(row) => LightSource::Light(side.infinite_row(row)),
+    };
+    match source {
+        LightSource::Light(row) => Animated {
+            node: scene.lights[row as usize].node,
+            middle: Vec3::ZERO,
+            strength: Strength::Light(row),
+        },
+        LightSource::Mesh { instance, .. } => {
+            let row = &scene.instances[instance as usize];
+            let positions = scene.meshes[row.mesh as usize].positions.iter().copied();
+            let middle = Aabb::around(positions).center();
+            Animated { node: row.node, middle, strength: Strength::Instance(instance) }
+        }
+    }
+}
+
+impl Animated {
+    /// Where it is and how strong.
+    fn at(&self, side: &SceneSide, pose: &Pose) -> (Affine3A, Vec3) {
+        let rgb = match self.strength {
+            Strength::Light(row) => side.scene.rgb_of_light(row, pose),
+            Strength::Instance(row) => side.scene.rgb_of_instance(row, pose),
+        };
+        (pose.world(self.node), rgb)
+    }
+}

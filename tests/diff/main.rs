@@ -1,0 +1,5 @@
+//! What a comparison of two versions says: laws, and each edit of a light by itself.
+
+mod edits;
+mod laws;
+mod street;
