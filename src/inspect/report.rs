@@ -10,7 +10,7 @@ use serde::Serialize;
 pub struct TreeReport {
     /// `candelabra.tree`.
     pub schema: &'static str,
-    /// [`VERSION`](super::VERSION).
+    /// [`VERSION`].
     pub version: u32,
     /// The file, as it was named.
     pub file: String,
