@@ -1,7 +1,7 @@
 //! Floor 6: looking inside tree files and scenes.
 //!
-//! [`TreeReport`] and [`SceneReport`] are numbers, for programs and for people; [`dot`] is the top of a
-//! tree as a graph, [`html`] a page with pictures. None changes what it looks at, and none samples:
+//! [`TreeReport`] and [`SceneReport`] are numbers, for programs and for people; [`dot()`] is the top of a
+//! tree as a graph, [`html()`] a page with pictures. None changes what it looks at, and none samples:
 //! what a tree is worth at a point is [`measure`](crate::measure)'s to say.
 //!
 //! | file | what |

@@ -10,7 +10,7 @@ use serde::Serialize;
 pub struct TreeReport {
     /// `candelabra.tree`.
     pub schema: &'static str,
-    /// [`VERSION`](super::VERSION).
+    /// [`VERSION`].
     pub version: u32,
     /// The file, as it was named.
     pub file: String,
@@ -94,7 +94,7 @@ impl TreeReport {
     pub fn of<D: AsRef<[u8]>>(tree: &LightTree<D>, file: &str, heaviest: usize) -> TreeReport {
         let lights = tree.lights();
         let count = |class| lights.iter().filter(|light| light.is(class)).count();
-        let energy = total_energy(tree);
+        let energy = lights.iter().map(|light| f64::from(light.energy)).sum();
         let emitters = tree.emitter_count();
         let span = |frames: &[crate::light_tree::FrameRow]| {
             let (first, last) = (frames.first()?.frame, frames.last()?.frame);
@@ -134,12 +134,7 @@ impl TreeReport {
     }
 }
 
-fn total_energy<D: AsRef<[u8]>>(tree: &LightTree<D>) -> f64 {
-    tree.lights().iter().map(|light| f64::from(light.energy)).sum()
-}
-
 /// The rows of all lights, that of the most energy first; equals in the order of their rows.
-
 pub fn by_energy<D: AsRef<[u8]>>(tree: &LightTree<D>) -> Vec<usize> {
     let lights = tree.lights();
     let mut rows: Vec<usize> = (0..lights.len()).collect();

@@ -12,7 +12,7 @@ use serde::Serialize;
 pub struct SceneReport {
     /// `candelabra.scene`.
     pub schema: &'static str,
-    /// [`VERSION`](super::VERSION).
+    /// [`VERSION`].
     pub version: u32,
     /// The file.
     pub file: String,

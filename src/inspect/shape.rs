@@ -22,7 +22,12 @@ pub struct Shape {
     pub deepest: usize,
     /// Groups on the way to a leaf, in the mean over all leaves.
     pub mean_depth: f64,
-    /// See [`cost`], in the mean over the trees.
+    /// The cost that the build keeps low, of a whole tree: the sum over its groups of
+    /// `energy * M_A * M_omega` of the cluster that the group opens, over the root's. If the chance that
+    /// a viewer somewhere opens a cluster is in proportion to that measure (the seed's surface area
+    /// and orientation heuristic), it is the number of groups that a viewer opens who opens the root.
+    /// From 1, a tree of one group, upwards; of two trees over the same emitters the smaller is the
+    /// better. In the mean over the trees.
     pub cost: f64,
 }
 
@@ -83,11 +88,7 @@ fn depths(groups: &[Group]) -> Vec<usize> {
     depths
 }
 
-/// The cost that the build keeps low, of the whole tree: the sum over its groups of
-/// `energy * M_A * M_omega` of the cluster that the group opens, over the root's. If the chance that a
-/// viewer somewhere opens a cluster is in proportion to that measure (the seed's surface area and
-/// orientation heuristic), it is the number of groups that a viewer opens who opens the root. From 1,
-/// a tree of one group, upwards; of two trees over the same emitters the smaller is the better.
+/// [`Shape::cost`] of one tree.
 fn cost(row: &TreeRow, groups: &[Group]) -> f64 {
     let root = measure(&row.root.bounds());
     if root == 0.0 {

@@ -10,7 +10,7 @@
 //! | `escape` | text that stays text |
 //! | `table` | a [`Table`] that sorts |
 //! | `plan` | a [`Plan`]: marks in space, from above and from the front |
-//! | `axes` | the scale that both views share |
+//! | `view`, `axes` | one way of looking at it, and the ticks around it |
 //! | `shade` | marks too many to be drawn, as a ground of density |
 //! | `heat` | a [`HeatMap`]: numbers on a grid as colours |
 //! | `raster` | pixels as an image inside the page |
@@ -24,6 +24,7 @@ mod plan;
 mod raster;
 mod shade;
 mod table;
+mod view;
 
 pub use heat::{HeatMap, Scale};
 pub use number::{Count, Short, Triple, counted};
