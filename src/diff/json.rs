@@ -1,12 +1,13 @@
 //! A comparison for programs.
 //!
-//! One JSON object. `schema` is `candelabra.diff` and `version` is 1: fields may be added in it, none
-//! changes or goes. Then, of two files, what [`Diff`] holds: `before` and `after` (`file`, `is_tree`),
-//! `totals`, `picking` (or `null`) and `changes`, each with `verb`, `share`, `before` and `after` (or
-//! `null`) and `differences`, each of these with an `aspect` and its amounts. Of two folders:
-//! `before`, `after` and `shots`, each with `name`, `outcome` (`added`, `removed`, `same`, `dirtied`
-//! or `trouble`) and, if it is dirtied, `diff` as above; if there is trouble, `message`. Units are in
-//! the names: `_m` metres, `_deg` degrees, `_cd` candela, `_lux`. What is infinite is `null`.
+//! One JSON object on one line. `schema` is `candelabra.diff` and `version` is 1: fields may be added
+//! in it, none changes or goes. Then, of two files, what [`Diff`] holds: `before` and `after` (`file`,
+//! `is_tree`), `totals`, `picking` (or `null`) and `changes`, each with `verb`, `share`, `before` and
+//! `after` (or `null`) and `differences`, each of these with an `aspect` and its amounts. Of two
+//! folders: `before`, `after` and `shots`, each with `name`, `outcome` (`added`, `removed`, `same`,
+//! `dirtied` or `trouble`) and, if it is dirtied, `diff` as above; if there is trouble, `message`.
+//! Units are in the names: `_m` metres, `_deg` degrees, `_cd` candela, `_lux`. What is infinite is
+//! `null`.
 
 use super::{Diff, FolderDiff};
 use serde::Serialize;
@@ -45,6 +46,6 @@ impl FolderDiff {
 
 fn write(out: &mut impl Write, content: &impl Serialize) -> io::Result<()> {
     let document = Document { schema: "candelabra.diff", version: SCHEMA_VERSION, content };
-    serde_json::to_writer_pretty(&mut *out, &document).map_err(io::Error::from)?;
+    serde_json::to_writer(&mut *out, &document).map_err(io::Error::from)?;
     writeln!(out)
 }
