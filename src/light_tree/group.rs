@@ -117,16 +117,15 @@ impl Group {
                 f32::from(self.half_extent[axis][lane]) * node::scale(self.half_exponent[lane])
             })
         };
-        let mut axis = [[0.0; WIDTH]; 3];
-        for lane in 0..WIDTH {
-            let [x, y, z] = node::decode_axis([self.axis[0][lane], self.axis[1][lane]]);
-            (axis[0][lane], axis[1][lane], axis[2][lane]) = (x, y, z);
+        let [mut x, mut y, mut z] = [[0.0; WIDTH]; 3];
+        for (lane, (&i, &j)) in self.axis[0].iter().zip(&self.axis[1]).enumerate() {
+            [x[lane], y[lane], z[lane]] = node::decode_axis([i, j]);
         }
         let is_endless = self.range == [0; WIDTH];
         Lanes {
             center: self.center,
             half_extent: [half_extent(0), half_extent(1), half_extent(2)],
-            axis,
+            axis: [x, y, z],
             sin_half_theta_o: each(|lane| node::decode_sin_half_theta_o(self.theta_o[lane])),
             cos_theta_e: each(|lane| node::decode_cos_theta_e(self.theta_e[lane])),
             two_sided: each(|lane| u32::from(node::is_two_sided(self.theta_o[lane]))),
