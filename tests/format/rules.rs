@@ -207,7 +207,7 @@ fn rows_of_the_rest(cases: &mut Cases) {
     cases.breaks("LGHT 1", Record::Row(4), |p| p.set("LGHT", light(3, 36), u32::MAX));
     cases.breaks("LGHT 2", Record::Row(1), |p| p.set("LGHT", light(1, 52), 4));
     cases.breaks("LGHT 2", Record::Row(1), |p| p.set("LGHT", light(1, 52), 8));
-    cases.breaks("LGHT 3", Record::Row(1), |p| p.set("LGHT", light(1, 60), 1));
+    cases.breaks("LGHT 3", Record::Row(1), |p| p.set("LGHT", light(1, 56), 9));
     for value in [f32::NAN, f32::INFINITY, -1.0] {
         cases.breaks("LGHT 4", Record::Row(1), |p| p.set("LGHT", light(1, 48), value.to_bits()));
     }
