@@ -19,7 +19,7 @@ const BINS: usize = 16;
 /// Clusters up to this size are cut between any two neighbours.
 const EXACT_UP_TO: usize = BINS;
 /// Items summed by one task, in a fixed grouping: sums must not depend on the thread count.
-const CHUNK: usize = 1 << 15;
+const CHUNK: usize = 1 << 13;
 
 /// A cluster, cut in two.
 pub struct Halves {
