@@ -57,6 +57,18 @@ pub(super) struct Described {
 }
 
 impl Light<'_> {
+    /// What it says itself; where it is, a side may know.
+    pub fn described(&self) -> Described {
+        Described {
+            card: self.card(),
+            to_world: None,
+            shape: None,
+            two_sided: false,
+            profile: self.profile,
+            placed: self.is(LightRow::PLACED),
+        }
+    }
+
     /// Whether nothing of it differs, except perhaps the path.
     pub fn has_content_of(&self, other: &Light) -> bool {
         self.fingerprint == other.fingerprint

@@ -9,7 +9,6 @@ use crate::bounds::{Aabb, LightBounds};
 use crate::emitter::{
     Emitters, InfiniteLight, LightOverflow, LightSource, PosedEmitters, infinite_lights,
 };
-use crate::light_tree::LightRow;
 use crate::pipeline::{self, BuildOptions, Survey};
 use crate::scene::{LightKind, Pose, Scene};
 use crate::store::AlignedBytes;
@@ -99,14 +98,7 @@ impl<'a> SceneSide<'a> {
 
     /// A light, described.
     pub fn describe(&self, light: &Light) -> Described {
-        let mut described = Described {
-            card: light.card(),
-            to_world: None,
-            shape: None,
-            two_sided: false,
-            profile: light.profile,
-            placed: light.is(LightRow::PLACED),
-        };
+        let mut described = light.described();
         let row = match light.row {
             Row::Near(row) => row,
             Row::Infinite(row) => {

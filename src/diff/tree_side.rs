@@ -116,14 +116,7 @@ impl<'a, D: AsRef<[u8]>> Places<'a, D> {
 
     /// A light, described.
     pub fn describe(&self, light: &Light) -> Described {
-        let mut described = Described {
-            card: light.card(),
-            to_world: None,
-            shape: None,
-            two_sided: false,
-            profile: Profile::default(),
-            placed: light.is(LightRow::PLACED),
-        };
+        let mut described = light.described();
         let Row::Near(row) = light.row else { return described };
         let row = &self.tree.lights()[row as usize];
         let bounds = match self.placed.get(&row.first_emitter) {
