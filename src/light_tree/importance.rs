@@ -208,5 +208,7 @@ pub(super) fn factors(cluster: &Cluster, receiver: &Receiver) -> Factors {
 pub(super) fn importance(energy: f32, product: f32, decay: f32) -> f64 {
     /// Below every distance that `f32` squares, above nothing at all.
     const LEAST: f64 = 1e-60;
-    f64::from(energy) * f64::from(product) / (f64::from(decay) + LEAST)
+    let importance = f64::from(energy) * f64::from(product) / (f64::from(decay) + LEAST);
+    // A file that nobody verified may hold any energy: never less than nothing, never no number.
+    importance.max(0.0)
 }
