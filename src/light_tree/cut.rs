@@ -33,7 +33,7 @@ impl Picked {
     }
 }
 
-/// The part in the relative variance that no opening removes: shadows and reflections that no estimate
+/// The part in the relative variance that no opening removes: shadows, and whatever else no estimate
 /// knows of.
 const UNKNOWN: f64 = 0.04;
 
