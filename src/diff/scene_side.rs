@@ -115,11 +115,15 @@ impl<'a> SceneSide<'a> {
         };
         let entry = &self.emitters.lights()[row as usize];
         let bounds = self.posed().bounds(entry.first..entry.first + entry.count);
-        let bounds = bounds.expect("the survey found every light in range");
-        let bounds =
-            if let [one] = bounds.as_slice() { *one } else { LightBounds::around(&bounds) };
-        described.two_sided = bounds.cone.two_sided;
-        place(&mut described.card, &bounds);
+        // A light with a tree of its own is in range there, but may not be in the world.
+        let around = bounds.map(|bounds| match bounds.as_slice() {
+            [one] => *one,
+            all => LightBounds::around(all),
+        });
+        if let Ok(bounds) = around {
+            described.two_sided = bounds.cone.two_sided;
+            place(&mut described.card, &bounds);
+        }
         if let Some(half_angle) = light.profile.half_angle_rad {
             described.card.half_angle_deg = half_angle.to_degrees();
         }

@@ -7,7 +7,7 @@ use super::card::{LightCard, Place};
 use super::light::{Described, Light, Profile, Row, kind_of, without_crumbs};
 use crate::bounds::{Cone, LightBounds};
 use crate::light_tree::{InstanceRow, LightRow, LightTree, Link, Node, TreeKind, TreeRow};
-use glam::{Affine3A, Mat3, Vec3};
+use glam::{Affine3A, Vec3};
 use std::collections::HashMap;
 use std::f32::consts::PI;
 
@@ -135,10 +135,7 @@ impl<'a, D: AsRef<[u8]>> Places<'a, D> {
     }
 
     fn of_placed(&self, instance: &InstanceRow) -> (LightBounds, Affine3A) {
-        let to_local = Affine3A::from_mat3_translation(
-            Mat3::from_cols_array_2d(&instance.to_local.axes),
-            Vec3::from_array(instance.to_local.origin),
-        );
+        let to_local = instance.to_local.transform();
         let to_world = to_local.inverse();
         let own = self.tree.trees()[instance.tree as usize].root.bounds();
         let axis = to_world.transform_vector3(own.cone.axis).normalize_or(Vec3::Z);

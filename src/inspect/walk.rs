@@ -2,7 +2,7 @@
 
 use crate::bounds::Aabb;
 use crate::light_tree::{Group, InstanceRow, LightTree, Link, Node, TreeKind, TreeRow};
-use glam::{Affine3A, Mat3, Vec3};
+use glam::Affine3A;
 
 /// A node that a walk comes by.
 #[derive(Clone, Copy, Debug)]
@@ -153,10 +153,7 @@ impl<'a, D: AsRef<[u8]>, F: FnMut(&Stop) -> bool> Walk<'a, D, F> {
 
     /// The tree that an instance places, and the space that it is in.
     fn placed(&self, around: &Space, instance: &InstanceRow) -> (&'a TreeRow, Space) {
-        let to_local = Affine3A::from_mat3_translation(
-            Mat3::from_cols_array_2d(&instance.to_local.axes),
-            Vec3::from_array(instance.to_local.origin),
-        );
+        let to_local = instance.to_local.transform();
         let space = Space {
             to_world: around.to_world * to_local.inverse(),
             brightness: around.brightness,
@@ -178,7 +175,7 @@ mod tests {
     use crate::light_tree::{LightLook, LightRow, LightSummary, LightTreeWriter};
     use crate::math::Similarity;
     use crate::store::AlignedBytes;
-    use glam::Quat;
+    use glam::{Quat, Vec3};
 
     fn lamp(at: Vec3, energy: f32) -> LightBounds {
         let aabb = Aabb { min: at, max: at };

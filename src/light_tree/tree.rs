@@ -166,7 +166,7 @@ impl<D: AsRef<[u8]>> LightTree<D> {
             return Ok((None, &[]));
         }
         let forced = self.forced();
-        if self.frames.is_none() {
+        if self.frames().is_empty() {
             let still = |row: &TreeRow| TreeKind::of(row) == Some(TreeKind::Still);
             let root = self.trees().iter().position(still).map(|row| row as u32);
             return Ok((root, forced));

@@ -35,9 +35,13 @@ impl Similarity {
 
     /// Whether every number is finite and shapes are kept.
     pub fn is_sound(&self) -> bool {
-        let transform =
-            Affine3A::from_mat3_translation(self.linear(), Vec3::from_array(self.origin));
+        let transform = self.transform();
         transform.is_finite() && keeps_shapes(&transform)
+    }
+
+    /// As a transform.
+    pub fn transform(&self) -> Affine3A {
+        Affine3A::from_mat3_translation(self.linear(), Vec3::from_array(self.origin))
     }
 
     /// By how much lengths grow.

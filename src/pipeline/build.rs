@@ -6,7 +6,7 @@ use crate::bounds::{Aabb, Cone, LightBounds};
 use crate::light_tree::{ALGORITHM_VERSION, Base, LightTree, LightTreeWriter, Link, TreeKind};
 use crate::math::Similarity;
 use crate::store::AlignedBytes;
-use glam::{Affine3A, Mat3, Vec3};
+use glam::Vec3;
 use std::borrow::Cow;
 use std::collections::HashMap;
 
@@ -195,10 +195,7 @@ fn stand_alike(a: &Group, b: &Group) -> bool {
 fn in_world(own: &LightBounds, placed: &PlacedLight) -> LightBounds {
     /// What rounding may turn an axis by, radians.
     const TURN: f32 = 1e-6;
-    let to_local = Affine3A::from_mat3_translation(
-        Mat3::from_cols_array_2d(&placed.to_local.axes),
-        Vec3::from_array(placed.to_local.origin),
-    );
+    let to_local = placed.to_local.transform();
     let to_world = to_local.inverse();
     let box_in_world = own.aabb.transformed(&to_world);
     let size = box_in_world.min.abs().max(box_in_world.max.abs()).max_element()

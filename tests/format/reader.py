@@ -145,7 +145,7 @@ class File:
         self.trees = [struct.unpack("<4I", r[:16]) + (Node.alone(r[16:]),) for r in rows("TREE", 48)]
         self.groups = [read_group(r) for r in rows("GRUP", 256)]
         self.instances = [struct.unpack("<12f4I", r) for r in rows("INST", 64)]
-        self.frames = [struct.unpack("<iIII", r) for r in rows("FRAM", 16)] if "FRAM" in s else None
+        self.frames = [struct.unpack("<iIII", r) for r in rows("FRAM", 16)] if s.get("FRAM") else None
         self.forced = [entry for (entry,) in struct.iter_unpack("<I", s.get("FORC", b""))]
         self.lights = []
         for r in rows("LGHT", 64):

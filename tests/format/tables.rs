@@ -3,8 +3,11 @@
 use crate::bytes::{Parts, Section};
 use crate::golden::{golden_bytes, path};
 use crate::probe::{probe, repaired};
-use candelabra::light_tree::LightTree;
+use candelabra::bounds::{Aabb, Cone, LightBounds};
+use candelabra::diff::{DiffOptions, Side, compare};
+use candelabra::light_tree::{LightLook, LightSummary, LightTree, LightTreeWriter, Link, TreeKind};
 use candelabra::store::{AlignedBytes, StoreError};
+use glam::Vec3;
 
 /// Opens and verifies.
 fn verify(bytes: &[u8]) -> Result<(), StoreError> {
@@ -112,6 +115,45 @@ fn a_header_that_lies_about_the_table_is_refused() {
         probe(&bytes);
         assert!(verify(repaired(&bytes).as_ref()).is_err(), "{count} sections");
     }
+}
+
+/// A list of frames that is there and empty says as much as none: all that is asked of a sound file
+/// has an answer.
+#[test]
+fn no_frames_are_no_frames() {
+    let lone = LightBounds {
+        aabb: Aabb::around([Vec3::Y]),
+        cone: Cone::ALL,
+        energy: 1.0,
+        range_m: f32::INFINITY,
+    };
+    let mut writer = LightTreeWriter::default();
+    writer.add_tree(TreeKind::Still, &[lone], |_| Link::Emitter(0));
+    writer.add_light(&LightSummary {
+        path: "/lamp".into(),
+        fingerprint: [3; 32],
+        emitter_count: 1,
+        energy: 1.0,
+        class: 0,
+        look: LightLook::default(),
+    });
+    let mut parts = Parts::of(writer.finish("{}", [4; 32]).as_ref());
+    let before = parts.file();
+    parts.sections.push(Section { name: *b"FRAM", required: 1, element: 16, bytes: Vec::new() });
+    parts.section("LGHT")[0] ^= 1;
+    let after = parts.file();
+    let folder = tempfile::tempdir().unwrap();
+    let side = |name: &str, bytes: &AlignedBytes| {
+        let path = folder.path().join(name);
+        std::fs::write(&path, bytes.as_ref()).unwrap();
+        Side::open(&path).unwrap()
+    };
+    verify(after.as_ref()).unwrap();
+    probe(after.as_ref());
+    let tree = LightTree::open(after.as_ref()).unwrap();
+    assert!(tree.at_frame(7, &tree.leaf_table()).unwrap().root().is_some());
+    let sides = [side("before.ltree", &before), side("after.ltree", &after)];
+    compare(&sides[0], &sides[1], &DiffOptions::default()).unwrap();
 }
 
 /// The forward rules of the page.

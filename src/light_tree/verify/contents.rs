@@ -7,7 +7,6 @@ use crate::light_tree::node::{Link, Node};
 use crate::light_tree::records::{InstanceRow, LightRow, TreeKind, TreeRow};
 use crate::light_tree::tree::LightTree;
 use crate::store::{Record, Rule, Violation};
-use glam::{Affine3A, Mat3, Vec3};
 use std::ops::Range;
 
 /// What transforming a box may add, relative to its size and place.
@@ -97,10 +96,7 @@ impl<D: AsRef<[u8]> + Sync> LightTree<D> {
 /// The rule that is broken where something of a placed tree sticks out of the leaf that stands for it.
 /// Its energy is the leaf's own affair: a light may get brighter.
 fn sticks_out(leaf: &Node, instance: &InstanceRow, tree: &TreeRow) -> Option<Rule> {
-    let to_local = Affine3A::from_mat3_translation(
-        Mat3::from_cols_array_2d(&instance.to_local.axes),
-        Vec3::from_array(instance.to_local.origin),
-    );
+    let to_local = instance.to_local.transform();
     let (root, outer) = (tree.root.bounds(), leaf.bounds());
     let world = root.aabb.transformed(&to_local.inverse());
     let slack =
