@@ -5,7 +5,7 @@
 //! the share of picks that go to another light. 0 if they are equal, 1 if they have no light in
 //! common. Lights are matched as everywhere, so a light that was only renamed is the same. That
 //! nothing can be picked counts as a light of its own. Forced lights, which are never picked, do not
-//! count. Exact: both trees are walked whole.
+//! count. Exact, for a surface that reflects alike everywhere: both trees are walked whole.
 
 use super::scene_side::SceneSide;
 use crate::emitter::InfiniteLight;
@@ -69,6 +69,7 @@ impl<'a> Picks<'a> {
             }),
         }
     }
+
     /// Calls `visit` with numbers of lights and probabilities of picking them, without splitting;
     /// those of one light may come in parts. What they lack to 1 is left.
     fn for_each(&self, receiver: &Receiver, mut visit: impl FnMut(u32, f64)) {
