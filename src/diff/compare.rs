@@ -9,7 +9,7 @@ use super::over_time::apart;
 use super::pairs::{Half, Pair, Pairs};
 use super::picking::{PickingChange, Picks, picking_change};
 use super::probes::{box_around, probes};
-use super::side::{Side, SideError, Surveyed, TreeBytes};
+use super::side::{Side, SideError, Surveyed};
 use super::totals::{Tally, Totals};
 use super::{Diff, SideName};
 use crate::light_tree::LightTree;
@@ -49,7 +49,9 @@ pub fn compare(before: &Side, after: &Side, options: &DiffOptions) -> Result<Dif
     if is_same && !looks_closer {
         return Ok(same(names, tallies[0]));
     }
-    let (tree_before, tree_after) = rayon::join(|| sides[0].tree(), || sides[1].tree());
+    let [mut room_before, mut room_after] = [None, None];
+    let (tree_before, tree_after) =
+        rayon::join(|| sides[0].tree(&mut room_before), || sides[1].tree(&mut room_after));
     let trees = [&tree_before, &tree_after];
     let (picking, moved) = compare_picking(sides, trees, lights, &pairs);
     let describer = Describer::new(scenes, trees);
@@ -131,7 +133,7 @@ fn totals([before, after]: [Tally; 2], changes: &[Change], lights: usize) -> Tot
 
 fn compare_picking(
     sides: [&Surveyed; 2],
-    trees: [&LightTree<TreeBytes>; 2],
+    trees: [&LightTree<&[u8]>; 2],
     lights: [&[Light]; 2],
     pairs: &Pairs,
 ) -> (Option<PickingChange>, Vec<f64>) {
@@ -173,7 +175,7 @@ struct Weigher<'a> {
 
 impl<'a> Weigher<'a> {
     fn new(
-        trees: [&LightTree<TreeBytes>; 2],
+        trees: [&LightTree<&[u8]>; 2],
         tallies: [Tally; 2],
         moved: &'a [f64],
         apart: &'a HashMap<u32, Apart>,

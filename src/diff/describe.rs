@@ -4,20 +4,19 @@ use super::Mark;
 use super::light::{Described, Light};
 use super::pairs::Half;
 use super::scene_side::SceneSide;
-use super::side::TreeBytes;
 use super::tree_side::Places;
 use crate::light_tree::LightTree;
 
 /// Describes lights of either version: from the scenes if both are, else from both trees.
 pub(super) enum Describer<'a> {
     Scenes([&'a SceneSide<'a>; 2]),
-    Trees([Places<'a, TreeBytes<'a>>; 2]),
+    Trees([Places<'a, &'a [u8]>; 2]),
 }
 
 impl<'a> Describer<'a> {
     pub fn new(
         scenes: Option<[&'a SceneSide<'a>; 2]>,
-        trees: [&'a LightTree<TreeBytes<'a>>; 2],
+        trees: [&'a LightTree<&'a [u8]>; 2],
     ) -> Describer<'a> {
         match scenes {
             Some(scenes) => Describer::Scenes(scenes),

@@ -9,6 +9,7 @@ use crate::bounds::{Aabb, LightBounds};
 use crate::emitter::{
     Emitters, InfiniteLight, LightOverflow, LightSource, PosedEmitters, infinite_lights,
 };
+use crate::light_tree::LightTree;
 use crate::pipeline::{self, BuildOptions, Survey};
 use crate::scene::{LightKind, Pose, Scene};
 use crate::store::AlignedBytes;
@@ -59,8 +60,9 @@ impl<'a> SceneSide<'a> {
     }
 
     /// The tree of the first frame.
-    pub fn build(&self) -> AlignedBytes {
-        pipeline::build_tree(&self.survey, &BuildOptions::default())
+    pub fn build(&self) -> LightTree<AlignedBytes> {
+        let bytes = pipeline::build_tree(&self.survey, &BuildOptions::default());
+        LightTree::open(bytes).expect("what was just built can be opened")
     }
 
     /// The lights at infinity that are picked and shine in the first frame, with their numbers, which

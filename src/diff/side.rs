@@ -9,7 +9,7 @@ use crate::ingest::IngestError;
 use crate::light_tree::LightTree;
 use crate::pipeline::{self, OpenedTree, TreeError};
 use crate::scene::Scene;
-use crate::store::{AlignedBytes, Mmap};
+use crate::store::AlignedBytes;
 use std::path::{Path, PathBuf};
 
 /// A version to be compared.
@@ -19,7 +19,7 @@ pub struct Side {
 }
 
 enum Content {
-    Tree(Mmap),
+    Tree(Box<OpenedTree>),
     Scene(Box<Scene>),
 }
 
@@ -73,7 +73,7 @@ impl Side {
     /// A tree file that is open. It must have been verified.
     pub fn of_tree(path: &Path, tree: OpenedTree) -> Side {
         let name = SideName { file: path.display().to_string(), is_tree: true };
-        Side { name, content: Content::Tree(tree.into_bytes()) }
+        Side { name, content: Content::Tree(Box::new(tree)) }
     }
 
     /// A scene that has been read.
@@ -97,7 +97,7 @@ impl Side {
 
     fn tree(&self) -> Option<TreeSide<'_>> {
         match &self.content {
-            Content::Tree(bytes) => Some(TreeSide::new(bytes)),
+            Content::Tree(tree) => Some(TreeSide::new(tree)),
             Content::Scene(_) => None,
         }
     }
@@ -112,21 +112,6 @@ pub(super) fn is_tree_file(path: &Path) -> bool {
 pub(super) enum Surveyed<'a> {
     Tree(Box<TreeSide<'a>>),
     Scene(Box<SceneSide<'a>>),
-}
-
-/// The bytes of a tree: of a file, or just built.
-pub(super) enum TreeBytes<'a> {
-    Mapped(&'a [u8]),
-    Built(AlignedBytes),
-}
-
-impl AsRef<[u8]> for TreeBytes<'_> {
-    fn as_ref(&self) -> &[u8] {
-        match self {
-            TreeBytes::Mapped(bytes) => bytes,
-            TreeBytes::Built(bytes) => bytes.as_ref(),
-        }
-    }
 }
 
 impl<'a> Surveyed<'a> {
@@ -183,12 +168,14 @@ impl<'a> Surveyed<'a> {
         }
     }
 
-    /// Its tree, for the first frame at least.
-    pub fn tree(&self) -> LightTree<TreeBytes<'a>> {
-        let bytes = match self {
-            Surveyed::Tree(side) => TreeBytes::Mapped(side.bytes()),
-            Surveyed::Scene(side) => TreeBytes::Built(side.build()),
-        };
-        LightTree::open(bytes).expect("it was open before, or was just built")
+    /// Its tree, for the first frame at least; `room` keeps what has to be built for it.
+    pub fn tree<'b>(
+        &'b self,
+        room: &'b mut Option<LightTree<AlignedBytes>>,
+    ) -> LightTree<&'b [u8]> {
+        match self {
+            Surveyed::Tree(side) => side.tree(),
+            Surveyed::Scene(side) => room.insert(side.build()).by_reference(),
+        }
     }
 }

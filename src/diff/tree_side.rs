@@ -7,24 +7,23 @@ use super::card::{LightCard, Place};
 use super::light::{Described, Light, Profile, Row, kind_of, without_crumbs};
 use crate::bounds::{Cone, LightBounds};
 use crate::light_tree::{InstanceRow, LightRow, LightTree, Link, Node, TreeKind, TreeRow};
+use crate::pipeline::OpenedTree;
 use glam::{Affine3A, Vec3};
 use std::collections::HashMap;
 use std::f32::consts::PI;
 
 /// A tree, opened.
 pub(super) struct TreeSide<'a> {
-    bytes: &'a [u8],
     tree: LightTree<&'a [u8]>,
 }
 
 impl<'a> TreeSide<'a> {
-    /// Over the bytes of a tree that has been open before.
-    pub fn new(bytes: &'a [u8]) -> TreeSide<'a> {
-        TreeSide { bytes, tree: LightTree::open(bytes).expect("it was open before") }
+    pub fn new(tree: &'a OpenedTree) -> TreeSide<'a> {
+        TreeSide { tree: tree.by_reference() }
     }
 
-    pub fn bytes(&self) -> &'a [u8] {
-        self.bytes
+    pub fn tree(&self) -> LightTree<&[u8]> {
+        self.tree.by_reference()
     }
 
     /// The frames that have trees of their own.

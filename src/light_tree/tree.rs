@@ -53,8 +53,18 @@ impl<D: AsRef<[u8]>> LightTree<D> {
     }
 
     /// The same over a view of its bytes.
-    pub(super) fn by_reference(&self) -> LightTree<&[u8]> {
-        LightTree::open(self.container.bytes()).expect("these bytes have been opened before")
+    pub fn by_reference(&self) -> LightTree<&[u8]> {
+        LightTree {
+            container: self.container.by_reference(),
+            trees: self.trees.clone(),
+            groups: self.groups.clone(),
+            instances: self.instances.clone(),
+            frames: self.frames.clone(),
+            forced: self.forced.clone(),
+            lights: self.lights.clone(),
+            paths: self.paths.clone(),
+            walkable: self.walkable.clone(),
+        }
     }
 
     /// The bytes of the file.

@@ -165,6 +165,13 @@ impl<D: AsRef<[u8]>> Container<D> {
         Ok(Container { fingerprint: header.fingerprint, minor: header.minor, sections, data })
     }
 
+    /// The same over a view of its bytes.
+    pub fn by_reference(&self) -> Container<&[u8]> {
+        let Container { data, sections, fingerprint, minor } = self;
+        let sections = sections.clone();
+        Container { data: data.as_ref(), sections, fingerprint: *fingerprint, minor: *minor }
+    }
+
     /// Compares every section with its checksum, and the gaps between them with zero.
     ///
     /// # Errors
