@@ -39,29 +39,15 @@ pub enum What {
 /// been verified.
 pub fn walk<D: AsRef<[u8]>>(tree: &LightTree<D>, visit: impl FnMut(&Stop) -> bool) {
     let mut walk = Walk { tree, visit, open: Vec::new(), stops: 0 };
-    let (root, forced) = roots(tree);
-    if let Some(row) = root {
+    let first = tree.frames().first().map_or(0, |row| row.frame);
+    let Ok((root, forced)) = tree.roots_at(first) else { return };
+    if let Some(row) = root.and_then(|row| tree.trees().get(row as usize)) {
         walk.start(row, Space::WORLD, What::Cluster, f64::from(row.root.energy()));
     }
     for &instance in forced {
         let (row, space) = walk.placed(&Space::WORLD, &tree.instances()[instance as usize]);
         let light = walk.light_of(space.first_emitter);
         walk.start(row, space, What::Light(light), f64::from(tree.lights()[light].energy));
-    }
-}
-
-/// The tree of the first frame, if anything shines in it, and the instances that are forced then.
-fn roots<D: AsRef<[u8]>>(tree: &LightTree<D>) -> (Option<&TreeRow>, &[u32]) {
-    match tree.frames().first() {
-        None => {
-            let mut trees = tree.trees().iter();
-            let still = trees.find(|row| TreeKind::of(row) == Some(TreeKind::Still));
-            (still, tree.forced())
-        }
-        Some(frame) => {
-            let forced = &tree.forced()[frame.first_forced as usize..];
-            (tree.trees().get(frame.tree as usize), &forced[..frame.forced_count as usize])
-        }
     }
 }
 
@@ -197,14 +183,12 @@ mod tests {
         let still = [lamp(Vec3::ZERO, 5.0), LightBounds { aabb, energy: 36.0, ..own }];
         let links = [Link::Emitter(0), Link::Instance(instance)];
         writer.add_tree(TreeKind::Still, &still, |i| links[i]);
-        for (path, emitter_count, energy, class) in
-            [("/lamp", 1, 5.0, 0), ("/string", 12, 36.0, LightRow::PLACED)]
-        {
+        let lights = [("/lamp", 1, 5.0, 0), ("/string", 12, 36.0, LightRow::PLACED)];
+        let lights = lights.map(|(path, emitter_count, energy, class)| {
             let (path, fingerprint, look) = (path.into(), [0; 32], LightLook::default());
-            let light = LightSummary { path, fingerprint, emitter_count, energy, class, look };
-            writer.add_light(&light);
-        }
-        let tree = LightTree::open(writer.finish("{}", [0; 32])).unwrap();
+            LightSummary { path, fingerprint, emitter_count, energy, class, look }
+        });
+        let tree = LightTree::open(writer.finish(&lights, "{}", [0; 32])).unwrap();
         tree.verify().unwrap();
         tree
     }

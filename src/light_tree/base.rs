@@ -11,6 +11,10 @@ use super::node::Node;
 use super::records::{LightRow, TreeKind, TreeRow};
 use super::tree::LightTree;
 use super::writer::LightSummary;
+use rayon::prelude::*;
+
+/// Leaves that are looked up by one task.
+const CHUNK: usize = 1 << 12;
 
 /// The base of a build.
 pub struct Base<'a> {
@@ -55,26 +59,33 @@ impl<'a> Base<'a> {
         (emitter == old).then(|| (tree, self.tree.groups_of(tree)))
     }
 
-    /// The tree of what stands still, and where in it the leaves of the new one are.
-    pub(super) fn still(&self, leaves: impl Iterator<Item = Leaf>) -> Option<Earlier<'_>> {
-        Some(self.earlier(self.still_row()?, 0..self.tree.first_of_class(LightRow::PLACED), leaves))
+    /// The tree of what stands still, and where in it the leaves of the new one are. `leaf` tells what
+    /// they stand for, `count` of them in the order of their emitters.
+    pub(super) fn still(
+        &self,
+        count: usize,
+        leaf: impl Fn(usize) -> Leaf + Sync,
+    ) -> Option<Earlier<'_>> {
+        let own = 0..self.tree.first_of_class(LightRow::PLACED);
+        Some(self.earlier(self.still_row()?, own, count, leaf))
     }
 
     /// The same of the tree of a frame, by its place among the frames.
     pub(super) fn frame(
         &self,
         frame: usize,
-        leaves: impl Iterator<Item = Leaf>,
+        count: usize,
+        leaf: impl Fn(usize) -> Leaf + Sync,
     ) -> Option<Earlier<'_>> {
         let row = self.tree.frames().get(frame)?.tree;
         let is_own = kind_of(&self.tree, row) == Some(TreeKind::Frame) && !self.is_copy(row);
         let first = |class| self.tree.first_of_class(class);
         let own = first(LightRow::CHANGES)..first(LightRow::CHANGES | LightRow::PLACED);
-        is_own.then(|| self.earlier(&self.tree.trees()[row as usize], own, leaves))
+        is_own.then(|| self.earlier(&self.tree.trees()[row as usize], own, count, leaf))
     }
 
     fn still_row(&self) -> Option<&TreeRow> {
-        self.tree.trees().iter().find(|row| TreeKind::of(row) == Some(TreeKind::Still))
+        self.tree.still_tree().map(|row| &self.tree.trees()[row as usize])
     }
 
     /// Whether the tree of a frame may have got its clusters from the one before it, instead of
@@ -94,28 +105,42 @@ impl<'a> Base<'a> {
         &self,
         row: &TreeRow,
         own: std::ops::Range<u32>,
-        leaves: impl Iterator<Item = Leaf>,
+        count: usize,
+        leaf: impl Fn(usize) -> Leaf + Sync,
     ) -> Earlier<'_> {
         let old: Leaves = self.tree.leaves_of(row, own);
         let still = self.still_row().map(|row| bytemuck::bytes_of(&row.root));
-        let mut light = 0;
-        let slot = |leaf: Leaf| match leaf {
+        let slot = |leaf: Leaf, light: &mut usize| match leaf {
             Leaf::Below(tree) => {
                 old.below.filter(|_| still == Some(bytemuck::bytes_of(&tree.root)))
             }
             Leaf::Emitter(emitter) => {
-                // Leaves come in the order of their emitters.
-                while self.firsts.get(light + 1).is_some_and(|&next| next <= emitter) {
-                    light += 1;
-                }
-                let within = emitter.checked_sub(*self.firsts.get(light)?)?;
-                let old_emitter = self.old_firsts[light]? + within;
+                let behind = |first: &u32| *first <= emitter;
+                *light += self.firsts[*light..].iter().skip(1).take_while(|&f| behind(f)).count();
+                let within = emitter.checked_sub(*self.firsts.get(*light)?)?;
+                let old_emitter = self.old_firsts[*light]? + within;
                 old.find(old_emitter).map(|(slot, _)| slot)
             }
         };
         let first = row.first_group * WIDTH as u32;
-        let slots = leaves.map(slot).map(|slot| slot.map_or(CHANGED, |slot| slot - first));
-        Earlier { groups: self.tree.groups_of(row), slots: slots.collect() }
+        let mut slots = vec![CHANGED; count];
+        slots.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk, slots)| {
+            // Leaves come in the order of their emitters.
+            let mut light = self.light_before(leaf(chunk * CHUNK));
+            for (i, entry) in slots.iter_mut().enumerate() {
+                let found = slot(leaf(chunk * CHUNK + i), &mut light);
+                *entry = found.map_or(CHANGED, |slot| slot - first);
+            }
+        });
+        Earlier { groups: self.tree.groups_of(row), slots }
+    }
+
+    /// The place of the light that a leaf belongs to, if it belongs to one.
+    fn light_before(&self, leaf: Leaf) -> usize {
+        match leaf {
+            Leaf::Emitter(e) => self.firsts.partition_point(|&first| first <= e).saturating_sub(1),
+            Leaf::Below(_) => 0,
+        }
     }
 }
 
@@ -136,12 +161,29 @@ fn kind_of(tree: &LightTree<&[u8]>, row: u32) -> Option<TreeKind> {
 /// once; `None` if there is none.
 fn same_lights(tree: &LightTree<&[u8]>, lights: &[LightSummary]) -> Vec<Option<u32>> {
     let rows = tree.lights();
-    let mut found = vec![None; lights.len()];
+    let is_same = |row: &LightRow, light: &LightSummary| {
+        (row.class, row.fingerprint) == (light.class, light.fingerprint)
+    };
+    // Most often all are the same but some in the middle.
+    let differs = |(row, light): (&LightRow, &LightSummary)| !is_same(row, light);
+    let shorter = rows.len().min(lights.len());
+    let pairs = rows.par_iter().zip(lights);
+    let ahead = pairs.position_first(differs).unwrap_or(shorter);
+    let pairs = rows[ahead..].par_iter().rev().zip(lights[ahead..].par_iter().rev());
+    let behind = pairs.position_first(differs).unwrap_or(shorter - ahead);
+    let (old_end, new_end) = (rows.len() - behind, lights.len() - behind);
+    let at_same_place = |new: usize| {
+        let old =
+            if new < ahead { Some(new) } else { new.checked_sub(new_end).map(|n| old_end + n) };
+        old.map(|old| rows[old].first_emitter)
+    };
+    let mut found: Vec<_> = (0..lights.len()).into_par_iter().map(at_same_place).collect();
     // Both stand in the order of class and path, and most have a partner where the other list is.
     let (mut gone, mut come) = (Vec::new(), Vec::new());
-    let (mut old, mut new) = (0, 0);
-    while let (Some(row), Some(light)) = (rows.get(old), lights.get(new)) {
-        if (row.class, row.fingerprint) == (light.class, light.fingerprint) {
+    let (mut old, mut new) = (ahead, ahead);
+    while old < old_end && new < new_end {
+        let (row, light) = (&rows[old], &lights[new]);
+        if is_same(row, light) {
             found[new] = Some(row.first_emitter);
             (old, new) = (old + 1, new + 1);
             continue;
@@ -156,8 +198,8 @@ fn same_lights(tree: &LightTree<&[u8]>, lights: &[LightSummary]) -> Vec<Option<u
             new += 1;
         }
     }
-    gone.extend(old..rows.len());
-    come.extend(new..lights.len());
+    gone.extend(old..old_end);
+    come.extend(new..new_end);
     // Of the rest, those with the same content.
     let content = |row: &LightRow| (row.class, row.fingerprint);
     let content_of_new = |light: &LightSummary| (light.class, light.fingerprint);

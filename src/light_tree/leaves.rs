@@ -71,7 +71,7 @@ impl<D: AsRef<[u8]>> LightTree<D> {
             slots.truncate(count);
             slots
         });
-        let still = trees.iter().find(of_kind(TreeKind::Still));
+        let still = self.still_tree().map(|row| &trees[row as usize]);
         let first_placed = self.first_of_class(LightRow::PLACED);
         LeafTable {
             still: still.map_or_else(Leaves::default, |tree| self.leaves_of(tree, 0..first_placed)),

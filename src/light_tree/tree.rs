@@ -115,10 +115,14 @@ impl<D: AsRef<[u8]>> LightTree<D> {
 
     /// The prim path of a light; empty if its row lies.
     pub fn light_path(&self, light: &LightRow) -> &str {
+        std::str::from_utf8(self.path_bytes(light)).unwrap_or_default()
+    }
+
+    /// The same as bytes, which order as the text does.
+    pub(super) fn path_bytes(&self, light: &LightRow) -> &[u8] {
         let paths: &[u8] = self.container.view(&self.paths);
         let (start, length) = (light.path_offset as usize, light.path_length as usize);
-        let bytes = paths.get(start..).and_then(|rest| rest.get(..length)).unwrap_or_default();
-        std::str::from_utf8(bytes).unwrap_or_default()
+        paths.get(start..).and_then(|rest| rest.get(..length)).unwrap_or_default()
     }
 
     /// How many emitters the lights have.
@@ -166,20 +170,26 @@ impl<D: AsRef<[u8]>> LightTree<D> {
         self.container.verify_checksums()
     }
 
+    /// The row of the tree of what stands still, if there is one.
+    pub(super) fn still_tree(&self) -> Option<u32> {
+        // Trees stand in the order of their kinds.
+        let row = self.trees().partition_point(|row| row.kind < TreeKind::Still as u32);
+        let kind = self.trees().get(row).and_then(TreeKind::of);
+        (kind == Some(TreeKind::Still)).then_some(row as u32)
+    }
+
     /// What a frame samples: the row of its tree, `None` if nothing shines then, and the instances
     /// of its forced lights.
     ///
     /// # Errors
     /// [`NoSuchFrame`] if lights change and the file was built without this frame.
-    pub(super) fn roots_at(&self, frame: i32) -> Result<(Option<u32>, &[u32]), NoSuchFrame> {
+    pub fn roots_at(&self, frame: i32) -> Result<(Option<u32>, &[u32]), NoSuchFrame> {
         if !*self.walkable.get_or_init(|| self.is_walkable()) {
             return Ok((None, &[]));
         }
         let forced = self.forced();
         if self.frames().is_empty() {
-            let still = |row: &TreeRow| TreeKind::of(row) == Some(TreeKind::Still);
-            let root = self.trees().iter().position(still).map(|row| row as u32);
-            return Ok((root, forced));
+            return Ok((self.still_tree(), forced));
         }
         let frames = self.frames();
         match frames.binary_search_by_key(&frame, |row| row.frame) {

@@ -10,6 +10,7 @@ use super::records::{
 use crate::bounds::LightBounds;
 use crate::math::Similarity;
 use crate::store::{AlignedBytes, ContainerWriter};
+use rayon::prelude::*;
 
 /// What a tree file says of one light.
 #[derive(Clone, Debug, PartialEq)]
@@ -38,9 +39,6 @@ pub struct LightTreeWriter<'a> {
     instances: Vec<InstanceRow>,
     frames: Vec<FrameRow>,
     forced: Vec<u32>,
-    lights: Vec<LightRow>,
-    paths: Vec<u8>,
-    emitter_count: u32,
 }
 
 impl<'a> LightTreeWriter<'a> {
@@ -70,11 +68,11 @@ impl<'a> LightTreeWriter<'a> {
         stands_for: impl Fn(usize) -> Link + Sync,
     ) -> Option<u32> {
         let first_group = self.groups.len();
-        let leaves = (0..bounds.len()).map(|i| self.leaf(stands_for(i)));
+        let (count, leaf) = (bounds.len(), |i| self.leaf(stands_for(i)));
         let earlier = self.base.as_ref().and_then(|base| match kind {
             TreeKind::Shared => None,
-            TreeKind::Still => base.still(leaves),
-            TreeKind::Frame => base.frame(self.frames.len(), leaves),
+            TreeKind::Still => base.still(count, leaf),
+            TreeKind::Frame => base.frame(self.frames.len(), count, leaf),
         });
         let (root, reused) = build_tree(bounds, &stands_for, earlier, &mut self.groups)?;
         self.reused += reused;
@@ -170,31 +168,21 @@ impl<'a> LightTreeWriter<'a> {
         self.forced.extend_from_slice(instances);
     }
 
-    /// Adds lights, one after the other.
-    pub fn add_lights(&mut self, lights: &[LightSummary]) {
-        self.lights.reserve(lights.len());
-        self.paths.reserve(lights.iter().map(|light| light.path.len()).sum());
-        lights.iter().for_each(|light| self.add_light(light));
-    }
-
-    /// Adds a light; its emitters are numbered after those of the lights before it.
-    pub fn add_light(&mut self, light: &LightSummary) {
-        self.lights.push(LightRow {
-            fingerprint: light.fingerprint,
-            first_emitter: self.emitter_count,
-            emitter_count: light.emitter_count,
-            path_offset: self.paths.len() as u32,
-            path_length: light.path.len() as u32,
-            energy: light.energy,
-            class: light.class,
-            look: light.look,
-        });
-        self.emitter_count += light.emitter_count;
-        self.paths.extend_from_slice(light.path.as_bytes());
-    }
-
-    /// The bytes of the file.
-    pub fn finish(self, meta: &str, fingerprint: [u8; 32]) -> AlignedBytes {
+    /// The bytes of the file. Emitters are numbered in the order of the lights.
+    pub fn finish(
+        self,
+        lights: &[LightSummary],
+        meta: &str,
+        fingerprint: [u8; 32],
+    ) -> AlignedBytes {
+        let mut end = (0, 0);
+        let mut start = |light: &LightSummary| {
+            let start = end;
+            end = (start.0 + light.emitter_count, start.1 + light.path.len() as u32);
+            start
+        };
+        // The first emitter of each, and where its path begins.
+        let starts: Vec<(u32, u32)> = lights.iter().map(&mut start).collect();
         let mut file = ContainerWriter::default();
         file.section(records::META, false, meta.as_bytes());
         file.section(records::TREES, true, &self.trees);
@@ -208,8 +196,30 @@ impl<'a> LightTreeWriter<'a> {
         if !self.forced.is_empty() {
             file.section(records::FORCED, true, &self.forced);
         }
-        file.section(records::LIGHTS, true, &self.lights);
-        file.section(records::PATHS, true, &self.paths);
+        file.section_with(records::LIGHTS, true, lights.len(), |rows: &mut [LightRow]| {
+            let parts = (rows, lights, &starts).into_par_iter();
+            parts.for_each(|(row, light, start)| *row = row_of(light, *start));
+        });
+        file.section_with(records::PATHS, true, end.1 as usize, |mut rest: &mut [u8]| {
+            for path in lights.iter().map(|light| light.path.as_bytes()) {
+                let (place, behind) = rest.split_at_mut(path.len());
+                place.copy_from_slice(path);
+                rest = behind;
+            }
+        });
         file.finish(fingerprint)
+    }
+}
+
+fn row_of(light: &LightSummary, (first_emitter, path_offset): (u32, u32)) -> LightRow {
+    LightRow {
+        fingerprint: light.fingerprint,
+        first_emitter,
+        emitter_count: light.emitter_count,
+        path_offset,
+        path_length: light.path.len() as u32,
+        energy: light.energy,
+        class: light.class,
+        look: light.look,
     }
 }

@@ -60,14 +60,14 @@ fn write(survey: &Survey, options: &BuildOptions, writer: LightTreeWriter) -> Re
         });
         builder.frames(survey, still, below, &forced_still);
     }
-    let mut writer = builder.writer;
-    writer.add_lights(&survey.lights);
+    let writer = builder.writer;
     let meta = serde_json::json!({
         "program": options.program,
         ALGORITHM: ALGORITHM_VERSION,
     });
     let (leaves, reused) = (writer.leaf_count(), writer.reused_leaf_count());
-    Rebuilt { bytes: writer.finish(&meta.to_string(), survey.fingerprint), leaves, reused }
+    let bytes = writer.finish(&survey.lights, &meta.to_string(), survey.fingerprint);
+    Rebuilt { bytes, leaves, reused }
 }
 
 /// Under which name `META` has the version of the algorithm.

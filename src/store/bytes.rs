@@ -20,7 +20,7 @@ pub struct AlignedBytes {
 impl AlignedBytes {
     /// A zeroed buffer of `length` bytes.
     pub fn zeroed(length: usize) -> AlignedBytes {
-        AlignedBytes { blocks: vec![Block::zeroed(); length.div_ceil(ALIGNMENT)], length }
+        AlignedBytes { blocks: bytemuck::zeroed_vec(length.div_ceil(ALIGNMENT)), length }
     }
 
     /// A copy of some bytes.

@@ -2,6 +2,8 @@
 
 use super::{ALIGNMENT, AlignedBytes, Record, Rule, StoreError, Violation, error};
 use bytemuck::{Pod, Zeroable};
+use crc32fast::Hasher;
+use rayon::prelude::*;
 use std::fmt;
 use std::ops::Range;
 
@@ -66,30 +68,54 @@ pub struct Section {
 const HEADER_SIZE: usize = size_of::<Header>();
 const ROW_SIZE: usize = size_of::<Section>();
 
+/// Writes a section into its place.
+type Fill<'a> = Box<dyn FnOnce(&mut [u8]) + Send + 'a>;
+
 /// Gathers sections and lays them out.
 #[derive(Default)]
 pub struct ContainerWriter<'a> {
-    sections: Vec<(Section, &'a [u8])>,
+    sections: Vec<(Section, Fill<'a>)>,
 }
 
 impl<'a> ContainerWriter<'a> {
     /// Adds a section. Sections keep the order in which they are added.
-    pub fn section<T: Pod>(&mut self, id: SectionId, required: bool, elements: &'a [T]) {
-        let bytes: &[u8] = bytemuck::cast_slice(elements);
+    pub fn section<T: Pod + Send + Sync>(
+        &mut self,
+        id: SectionId,
+        required: bool,
+        elements: &'a [T],
+    ) {
+        let copy = |place: &mut [T]| {
+            let places = place.par_chunks_mut(CHUNK);
+            places.zip(elements.par_chunks(CHUNK)).for_each(|(to, from)| to.copy_from_slice(from));
+        };
+        self.section_with(id, required, elements.len(), copy);
+    }
+
+    /// Adds a section whose elements, zero at first, are written in place when the file is.
+    pub fn section_with<T: Pod>(
+        &mut self,
+        id: SectionId,
+        required: bool,
+        count: usize,
+        fill: impl FnOnce(&mut [T]) + Send + 'a,
+    ) {
         let row = Section {
             id,
             required: required.into(),
             offset: 0,
-            length: bytes.len() as u64,
+            length: (count * size_of::<T>()) as u64,
             element_size: size_of::<T>() as u32,
-            checksum: crc32fast::hash(bytes),
+            checksum: 0,
         };
-        self.sections.push((row, bytes));
+        let fill = |bytes: &mut [u8]| fill(bytemuck::cast_slice_mut(bytes));
+        self.sections.push((row, Box::new(fill)));
     }
 
     /// The whole file, with the content's fingerprint in its header.
     pub fn finish(mut self, fingerprint: [u8; 32]) -> AlignedBytes {
-        let mut end = HEADER_SIZE + self.sections.len() * ROW_SIZE;
+        let table_end = HEADER_SIZE + self.sections.len() * ROW_SIZE;
+        let mut end = table_end;
         for (row, _) in &mut self.sections {
             end = end.next_multiple_of(ALIGNMENT);
             row.offset = end as u64;
@@ -106,18 +132,45 @@ impl<'a> ContainerWriter<'a> {
             fingerprint,
         };
         let mut file = AlignedBytes::zeroed(end);
-        let bytes = file.as_mut();
-        bytes[..HEADER_SIZE].copy_from_slice(bytemuck::bytes_of(&header));
-        for (i, (row, content)) in self.sections.iter().enumerate() {
-            let at = HEADER_SIZE + i * ROW_SIZE;
-            bytes[at..at + ROW_SIZE].copy_from_slice(bytemuck::bytes_of(row));
-            bytes[row.offset as usize..][..content.len()].copy_from_slice(content);
+        let (head, mut rest) = file.as_mut().split_at_mut(table_end);
+        let mut at = table_end;
+        let mut places = Vec::with_capacity(self.sections.len());
+        for (row, fill) in self.sections {
+            let (_, place) = rest.split_at_mut(row.offset as usize - at);
+            let (place, behind) = place.split_at_mut(row.length as usize);
+            at = (row.offset + row.length) as usize;
+            rest = behind;
+            places.push((row, fill, place));
         }
-        let table_end = HEADER_SIZE + self.sections.len() * ROW_SIZE;
-        let checksum = crc32fast::hash(&bytes[..table_end]);
-        bytes[CHECKSUM_FIELD].copy_from_slice(&checksum.to_le_bytes());
+        let write = |(mut row, fill, place): (Section, Fill, &mut [u8])| {
+            fill(place);
+            row.checksum = checksum_of(place);
+            row
+        };
+        let rows: Vec<Section> = places.into_par_iter().map(write).collect();
+        head[..HEADER_SIZE].copy_from_slice(bytemuck::bytes_of(&header));
+        head[HEADER_SIZE..].copy_from_slice(bytemuck::cast_slice(&rows));
+        let checksum = crc32fast::hash(head);
+        head[CHECKSUM_FIELD].copy_from_slice(&checksum.to_le_bytes());
         file
     }
+}
+
+/// What one task copies, in elements, or sums, in bytes.
+const CHUNK: usize = 1 << 16;
+
+/// CRC-32, chunk by chunk, side by side.
+fn checksum_of(bytes: &[u8]) -> u32 {
+    let sum = |chunk: &[u8]| {
+        let mut hasher = Hasher::new();
+        hasher.update(chunk);
+        hasher
+    };
+    let join = |mut start: Hasher, end: Hasher| {
+        start.combine(&end);
+        start
+    };
+    bytes.par_chunks(CHUNK).map(sum).reduce(Hasher::new, join).finalize()
 }
 
 const CHECKSUM_FIELD: Range<usize> = 28..32;
@@ -147,7 +200,7 @@ impl<D: AsRef<[u8]>> Container<D> {
         {
             return Err(StoreError::Length { promised: header.file_length, actual });
         }
-        let mut hasher = crc32fast::Hasher::new();
+        let mut hasher = Hasher::new();
         hasher.update(&bytes[..CHECKSUM_FIELD.start]);
         hasher.update(&[0; 4]);
         hasher.update(&bytes[CHECKSUM_FIELD.end..table_end]);
@@ -184,7 +237,7 @@ impl<D: AsRef<[u8]>> Container<D> {
             if bytes[end..range.start].iter().any(|&byte| byte != 0) {
                 return Err(broken(error::GAPS_ARE_ZERO, section.id));
             }
-            if crc32fast::hash(&bytes[range.clone()]) != section.checksum {
+            if checksum_of(&bytes[range.clone()]) != section.checksum {
                 return Err(StoreError::Checksum { section: Some(section.id) });
             }
             end = range.end;

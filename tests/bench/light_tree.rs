@@ -47,15 +47,15 @@ fn triangles(count: u32) -> Vec<LightBounds> {
 fn build(bounds: &[LightBounds]) -> AlignedBytes {
     let mut writer = LightTreeWriter::default();
     writer.add_tree(TreeKind::Still, bounds, |i| Link::Emitter(i as u32));
-    writer.add_light(&LightSummary {
+    let light = LightSummary {
         path: "/mesh".into(),
         fingerprint: [0; 32],
         emitter_count: bounds.len() as u32,
         energy: 1.0,
         class: 0,
         look: LightLook::default(),
-    });
-    writer.finish("{}", [0; 32])
+    };
+    writer.finish(&[light], "{}", [0; 32])
 }
 
 fn benchmarks(criterion: &mut Criterion) {

@@ -24,15 +24,15 @@ fn points(count: u32) -> Parts {
     let bounds = vec![point(1.0); count as usize];
     let mut writer = LightTreeWriter::default();
     writer.add_tree(TreeKind::Still, &bounds, |i| Link::Emitter(i as u32));
-    writer.add_light(&LightSummary {
+    let light = LightSummary {
         path: "/points".into(),
         fingerprint: [0; 32],
         emitter_count: count,
         energy: count as f32,
         class: 0,
         look: LightLook::default(),
-    });
-    Parts::of(writer.finish("{}", [0; 32]).as_ref())
+    };
+    Parts::of(writer.finish(&[light], "{}", [0; 32]).as_ref())
 }
 
 /// Points, and in the place of their tree `count` groups, all of whose lanes that `leads` says lead on to

@@ -129,15 +129,15 @@ fn no_frames_are_no_frames() {
     };
     let mut writer = LightTreeWriter::default();
     writer.add_tree(TreeKind::Still, &[lone], |_| Link::Emitter(0));
-    writer.add_light(&LightSummary {
+    let light = LightSummary {
         path: "/lamp".into(),
         fingerprint: [3; 32],
         emitter_count: 1,
         energy: 1.0,
         class: 0,
         look: LightLook::default(),
-    });
-    let mut parts = Parts::of(writer.finish("{}", [4; 32]).as_ref());
+    };
+    let mut parts = Parts::of(writer.finish(&[light], "{}", [4; 32]).as_ref());
     let before = parts.file();
     parts.sections.push(Section { name: *b"FRAM", required: 1, element: 16, bytes: Vec::new() });
     parts.section("LGHT")[0] ^= 1;

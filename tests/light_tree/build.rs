@@ -54,7 +54,7 @@ proptest! {
     ) {
         let mut writer = LightTreeWriter::default();
         writer.add_tree(TreeKind::Still, &bounds, |i| Link::Emitter(i as u32));
-        let bytes = writer.finish("", [0; 32]);
+        let bytes = writer.finish(&[], "", [0; 32]);
         let mut damaged = bytes.as_ref().to_vec();
         damaged[at.index(bytes.as_ref().len())] ^= 1 << bit;
         let Ok(tree) = LightTree::open(AlignedBytes::copy_of(&damaged)) else { return Ok(()) };

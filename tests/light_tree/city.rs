@@ -96,8 +96,8 @@ impl City {
         for bounds in &self.shared {
             writer.add_tree(TreeKind::Shared, bounds, |i| Link::Emitter(i as u32));
         }
-        let mut next_emitter = 0;
-        let (links, bounds) = self.leaves(&self.still, 0, &mut writer, &mut next_emitter);
+        let mut lights = Vec::new();
+        let (links, bounds) = self.leaves(&self.still, 0, &mut writer, &mut lights);
         let still = writer.add_tree(TreeKind::Still, &bounds, |i| links[i]);
         let (mut links, mut bounds, mut second) = (Vec::new(), Vec::new(), Vec::new());
         let changes = !self.changing.flat.is_empty() || !self.changing.placed.is_empty();
@@ -108,11 +108,11 @@ impl City {
                 bounds.push(writer.bounds_of(still));
             }
             let class = LightRow::CHANGES;
-            let above = self.leaves(&self.changing, class, &mut writer, &mut next_emitter);
+            let above = self.leaves(&self.changing, class, &mut writer, &mut lights);
             links.extend(above.0);
             bounds.extend(above.1);
         }
-        let forced = self.instances(&self.forced, 5, &mut writer, &mut next_emitter);
+        let forced = self.instances(&self.forced, 5, &mut writer, &mut lights);
         if changes {
             let tree = writer.add_tree(TreeKind::Frame, &bounds, |i| links[i]);
             writer.add_frame(1, tree, &forced);
@@ -127,7 +127,7 @@ impl City {
         } else {
             writer.add_forced(&forced);
         }
-        let tree = LightTree::open(writer.finish("{}", [3; 32])).expect("it opens");
+        let tree = LightTree::open(writer.finish(&lights, "{}", [3; 32])).expect("it opens");
         (tree, second)
     }
 
@@ -136,16 +136,16 @@ impl City {
         part: &Part,
         class: u32,
         writer: &mut LightTreeWriter,
-        next_emitter: &mut u32,
+        lights: &mut Vec<LightSummary>,
     ) -> (Vec<Link>, Vec<LightBounds>) {
         let count = part.flat.len() as u32;
-        let mut links: Vec<Link> = (0..count).map(|i| Link::Emitter(*next_emitter + i)).collect();
+        let first = next_emitter(lights);
+        let mut links: Vec<Link> = (first..first + count).map(Link::Emitter).collect();
         if count > 0 {
-            writer.add_light(&summary("/flat".into(), count, class));
-            *next_emitter += count;
+            lights.push(summary("/flat".into(), count, class));
         }
         let class = class | LightRow::PLACED;
-        let rows = self.instances(&part.placed, class, writer, next_emitter);
+        let rows = self.instances(&part.placed, class, writer, lights);
         links.extend(rows.into_iter().map(Link::Instance));
         let mut bounds = part.flat.clone();
         bounds.extend(part.placed.iter().map(|placed| {
@@ -161,15 +161,14 @@ impl City {
         placed: &[Placed],
         class: u32,
         writer: &mut LightTreeWriter,
-        next_emitter: &mut u32,
+        lights: &mut Vec<LightSummary>,
     ) -> Vec<u32> {
         let mut rows = Vec::new();
         for (i, placed) in placed.iter().enumerate() {
             let to_local = Similarity::undoing(&placed.to_world).expect("it keeps shapes");
             let count = self.shared[placed.tree].len() as u32;
-            rows.push(writer.add_instance(placed.tree as u32, to_local, *next_emitter));
-            writer.add_light(&summary(format!("/placed_{i:03}"), count, class));
-            *next_emitter += count;
+            rows.push(writer.add_instance(placed.tree as u32, to_local, next_emitter(lights)));
+            lights.push(summary(format!("/placed_{i:03}"), count, class));
         }
         rows
     }
@@ -185,6 +184,10 @@ impl City {
         }
         all
     }
+}
+
+fn next_emitter(lights: &[LightSummary]) -> u32 {
+    lights.iter().map(|light| light.emitter_count).sum()
 }
 
 fn summary(path: String, emitter_count: u32, class: u32) -> LightSummary {

@@ -16,15 +16,15 @@ pub type Tree = LightTree<AlignedBytes>;
 pub fn tree_over(bounds: &[LightBounds]) -> Tree {
     let mut writer = LightTreeWriter::default();
     writer.add_tree(TreeKind::Still, bounds, |i| Link::Emitter(i as u32));
-    writer.add_light(&LightSummary {
+    let light = LightSummary {
         path: "/lights".into(),
         fingerprint: [1; 32],
         emitter_count: bounds.len() as u32,
         energy: bounds.iter().map(|b| b.energy).sum(),
         class: 0,
         look: LightLook::default(),
-    });
-    LightTree::open(writer.finish("{}", [2; 32])).expect("a tree just written opens")
+    };
+    LightTree::open(writer.finish(&[light], "{}", [2; 32])).expect("a tree just written opens")
 }
 
 pub fn direction() -> impl Strategy<Value = Vec3> {

@@ -2,7 +2,7 @@
 
 use super::item::Item;
 use crate::bounds::{Aabb, Cone};
-use glam::{DVec3, Vec3};
+use glam::{DVec4, Vec3, Vec3A};
 use std::f32::consts::{FRAC_PI_2, PI, TAU};
 
 /// Box, energy and spread of orientations of some items, for costs only.
@@ -12,21 +12,21 @@ use std::f32::consts::{FRAC_PI_2, PI, TAU};
 /// of cones, taken one after the other, cannot promise.
 #[derive(Clone, Copy)]
 pub struct Bin {
-    pub count: usize,
-    aabb: Aabb,
-    energy: f64,
-    /// Sum over the items of energy times mean direction.
-    directed: DVec3,
+    /// Sum over the items of energy times mean direction, and of energy.
+    directed: DVec4,
+    min: Vec3A,
+    max: Vec3A,
+    pub count: u32,
     theta_e: f32,
     two_sided: bool,
 }
 
 impl Bin {
     pub const EMPTY: Bin = Bin {
+        directed: DVec4::ZERO,
+        min: Vec3A::INFINITY,
+        max: Vec3A::NEG_INFINITY,
         count: 0,
-        aabb: Aabb::EMPTY,
-        energy: 0.0,
-        directed: DVec3::ZERO,
         theta_e: 0.0,
         two_sided: false,
     };
@@ -40,9 +40,9 @@ impl Bin {
     #[inline]
     pub fn add(&mut self, item: &Item) {
         self.count += 1;
-        self.aabb = self.aabb.union(&item.aabb);
-        self.energy += f64::from(item.energy);
-        self.directed += item.directed.as_dvec3();
+        self.min = self.min.min(item.min);
+        self.max = self.max.max(item.max);
+        self.directed += item.directed.as_dvec4();
         self.two_sided |= item.two_sided;
         self.theta_e = self.theta_e.max(item.theta_e);
     }
@@ -50,8 +50,8 @@ impl Bin {
     #[inline]
     pub fn merge(&mut self, other: &Bin) {
         self.count += other.count;
-        self.aabb = self.aabb.union(&other.aabb);
-        self.energy += other.energy;
+        self.min = self.min.min(other.min);
+        self.max = self.max.max(other.max);
         self.directed += other.directed;
         self.two_sided |= other.two_sided;
         self.theta_e = self.theta_e.max(other.theta_e);
@@ -62,12 +62,14 @@ impl Bin {
         if self.count == 0 {
             return 0.0;
         }
-        self.energy * self.aabb.measure() * f64::from(self.orientation_measure())
+        let aabb = Aabb { min: self.min.into(), max: self.max.into() };
+        self.directed.w * aabb.measure() * f64::from(self.orientation_measure())
     }
 
     /// [`Cone::measure`] of the estimated cone.
     fn orientation_measure(&self) -> f32 {
-        let cos_o = (2.0 * (self.directed.length() / self.energy).min(1.0) - 1.0) as f32;
+        let (directed, energy) = (self.directed.truncate(), self.directed.w);
+        let cos_o = (2.0 * (directed.length() / energy).min(1.0) - 1.0) as f32;
         if self.theta_e == FRAC_PI_2 {
             return measure_of_faces(cos_o, self.two_sided);
         }

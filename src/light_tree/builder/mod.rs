@@ -19,7 +19,7 @@ pub(super) use reuse::{CHANGED, Earlier};
 
 use super::group::{Group, WIDTH};
 use super::node::{Link, MOST, Node};
-use crate::bounds::LightBounds;
+use crate::bounds::{Aabb, LightBounds};
 use bytemuck::Zeroable;
 use item::Item;
 use rayon::prelude::*;
@@ -52,18 +52,37 @@ pub(super) fn build_tree(
         return None;
     }
     let items = order::canonical(bounds);
+    let centers = saoh::center_box(&items);
     let reuse = earlier.map(|earlier| {
         out.reserve(earlier.groups.len());
         Reuse::new(earlier, &items, bounds)
     });
     let builder = Builder { bounds, items, link, reuse };
-    let mut all: Vec<u32> = (0..bounds.len() as u32).collect();
-    let around = builder.build_cluster(&mut all, 0, out);
+    let mut places: Vec<u32> = (0..bounds.len() as u32).collect();
+    let all = Cluster { places: &mut places, centers, cost: f64::INFINITY };
+    let around = builder.build_cluster(all, 0, out);
     Some((around, builder.reuse.map_or(0, |reuse| reuse.reused())))
 }
 
-/// What is the same for all clusters. A cluster is a list of places in the canonical order,
-/// ascending.
+/// Some of the items.
+struct Cluster<'a> {
+    /// Their places in the canonical order, ascending.
+    places: &'a mut [u32],
+    /// The box around their centres.
+    centers: Aabb,
+    /// What it costs, as [`saoh`] counts.
+    cost: f64,
+}
+
+impl Cluster<'_> {
+    /// Leaves an empty one in its place.
+    fn take(&mut self) -> Self {
+        let empty = Cluster { places: &mut [], ..*self };
+        std::mem::replace(self, empty)
+    }
+}
+
+/// What is the same for all clusters.
 struct Builder<'a, L> {
     bounds: &'a [LightBounds],
     /// In canonical order.
@@ -75,32 +94,28 @@ struct Builder<'a, L> {
 impl<L: Fn(usize) -> Link + Sync> Builder<'_, L> {
     /// Builds the groups of a cluster and returns its bounds as its nodes have them: rounded outwards
     /// already, so that what a node says of itself contains what its children say.
-    fn build_cluster(
-        &self,
-        cluster: &mut [u32],
-        depth: usize,
-        out: &mut Vec<Group>,
-    ) -> LightBounds {
+    fn build_cluster(&self, cluster: Cluster, depth: usize, out: &mut Vec<Group>) -> LightBounds {
         let own = out.len();
         if let Some(reuse) = &self.reuse
-            && let Some(found) = reuse.find(cluster, depth)
+            && let Some(found) = reuse.find(cluster.places, depth)
         {
             reuse.copy(found, self.link, out);
             return bounds_of_lanes(&out[own]);
         }
         out.push(Group::zeroed());
-        let go_parallel = cluster.len() > PARALLEL_ABOVE;
+        let go_parallel = cluster.places.len() > PARALLEL_ABOVE;
         let mut parts = self.divide(cluster, depth);
-        let build_apart = |part: &mut &mut [u32]| {
+        let build_apart = |part: &mut Cluster| {
             let mut groups = Vec::new();
-            let bounds = (part.len() > 1).then(|| self.build_cluster(part, depth + 1, &mut groups));
+            let is_one = part.places.len() == 1;
+            let bounds = (!is_one).then(|| self.build_cluster(part.take(), depth + 1, &mut groups));
             (bounds, groups)
         };
         let mut apart: Vec<_> =
             if go_parallel { parts.par_iter_mut().map(build_apart).collect() } else { Vec::new() };
         let mut nodes = Vec::with_capacity(WIDTH);
         for (lane, part) in parts.into_iter().enumerate() {
-            if let [place] = *part {
+            if let [place] = *part.places {
                 let index = self.items[place as usize].index as usize;
                 nodes.push(Node::encode(&self.bounds[index], (self.link)(index)));
                 continue;
@@ -124,24 +139,27 @@ impl<L: Fn(usize) -> Link + Sync> Builder<'_, L> {
     /// Cuts a cluster into up to eight parts: the costliest first of those that fill a group of their
     /// own. Lanes that are left then take the leaves of the smallest parts, whose groups would be
     /// nearly empty.
-    fn divide<'a>(&self, cluster: &'a mut [u32], depth: usize) -> Vec<&'a mut [u32]> {
-        let mut parts: Vec<&mut [u32]> = Vec::with_capacity(WIDTH);
+    fn divide<'c>(&self, cluster: Cluster<'c>, depth: usize) -> Vec<Cluster<'c>> {
+        let mut parts = Vec::with_capacity(WIDTH);
         parts.push(cluster);
-        let mut costs = vec![f64::INFINITY];
-        while let Some(at) = next_to_cut(&parts, &costs) {
+        while let Some(at) = next_to_cut(&parts) {
             let lanes_left = WIDTH - parts.len();
-            let part = std::mem::take(&mut parts[at]);
-            if part.len() - 1 <= lanes_left {
-                costs.splice(at..=at, part.iter().map(|_| 0.0));
-                parts.splice(at..=at, part.chunks_mut(1));
+            let Cluster { places, centers, .. } = parts[at].take();
+            if places.len() - 1 <= lanes_left {
+                let one = |places| Cluster { places, centers, cost: 0.0 };
+                parts.splice(at..=at, places.chunks_mut(1).map(one));
                 continue;
             }
-            let by_cost =
-                if depth < DEEPEST_BY_COST { saoh::partition(&self.items, part) } else { None };
-            let Halves { left_count, cost } = by_cost.unwrap_or(Halves::even(part.len()));
-            let (left, right) = part.split_at_mut(left_count);
-            parts.splice(at..=at, [left, right]);
-            costs.splice(at..=at, cost);
+            let by_cost = (depth < DEEPEST_BY_COST)
+                .then(|| saoh::partition(&self.items, places, &centers))
+                .flatten();
+            let halves = by_cost.unwrap_or(Halves::even(places.len(), centers));
+            let (left, right) = places.split_at_mut(halves.left_count);
+            let half = |i: usize, places| {
+                let (centers, cost) = (halves.centers[i], halves.cost[i]);
+                Cluster { places, centers, cost }
+            };
+            parts.splice(at..=at, [half(0, left), half(1, right)]);
         }
         parts
     }
@@ -154,21 +172,16 @@ fn bounds_of_lanes(group: &Group) -> LightBounds {
 }
 
 /// Which part to cut next; `None` if all lanes are used or none can be cut.
-fn next_to_cut(parts: &[&mut [u32]], costs: &[f64]) -> Option<usize> {
+fn next_to_cut(parts: &[Cluster]) -> Option<usize> {
     if parts.len() == WIDTH {
         return None;
     }
+    let size = |at: usize| parts[at].places.len();
+    let cost = |a: usize, b: usize| parts[a].cost.total_cmp(&parts[b].cost);
     // Coincident lights cost nothing: then the largest.
-    let by_cost = |&a: &usize, &b: &usize| {
-        costs[a].total_cmp(&costs[b]).then(parts[a].len().cmp(&parts[b].len()))
-    };
+    let by_cost = |&a: &usize, &b: &usize| cost(a, b).then(size(a).cmp(&size(b)));
+    let by_size = |&a: &usize, &b: &usize| size(a).cmp(&size(b)).then(cost(a, b));
     let all = 0..parts.len();
-    let large = all.clone().filter(|&i| parts[i].len() > WIDTH).max_by(by_cost);
-    large.or_else(|| {
-        let small = all.filter(|&i| parts[i].len() > 1);
-        let by_size = |&a: &usize, &b: &usize| {
-            parts[a].len().cmp(&parts[b].len()).then(costs[a].total_cmp(&costs[b]))
-        };
-        small.min_by(by_size)
-    })
+    let large = all.clone().filter(|&at| size(at) > WIDTH).max_by(by_cost);
+    large.or_else(|| all.filter(|&at| size(at) > 1).min_by(by_size))
 }

@@ -141,7 +141,7 @@ fn forget_swapped(slots: &mut [u32], groups: &[Group], items: &[Item], bounds: &
     let of = |item: &Item| &bounds[item.index as usize];
     let old = |slot: u32| groups[slot as usize / WIDTH].link(slot as usize % WIDTH);
     let mut first = 0;
-    for run in items.chunk_by(|a, b| a.aabb == b.aabb && total_order(of(a), of(b)).is_eq()) {
+    for run in items.chunk_by(|a, b| a.min == b.min && total_order(of(a), of(b)).is_eq()) {
         let slots = &mut slots[first..first + run.len()];
         first += run.len();
         let known = slots.iter().copied().filter(|&slot| slot != CHANGED);

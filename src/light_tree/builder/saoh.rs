@@ -11,7 +11,7 @@
 use super::bins::Bin;
 use super::item::Item;
 use crate::bounds::Aabb;
-use glam::Vec3;
+use glam::Vec3A;
 use rayon::prelude::*;
 
 /// Slabs along each axis of a large cluster.
@@ -27,12 +27,14 @@ pub struct Halves {
     pub left_count: usize,
     /// What each half costs.
     pub cost: [f64; 2],
+    /// The boxes around the centres of the items of each half.
+    pub centers: [Aabb; 2],
 }
 
 impl Halves {
-    /// A cut by count, of items that cannot be told apart.
-    pub fn even(count: usize) -> Halves {
-        Halves { left_count: count / 2, cost: [0.0; 2] }
+    /// A cut by count, of items that cannot be told apart, or need not be any more.
+    pub fn even(count: usize, centers: Aabb) -> Halves {
+        Halves { left_count: count / 2, cost: [0.0; 2], centers: [centers; 2] }
     }
 }
 
@@ -46,27 +48,54 @@ struct Cut {
 }
 
 /// Reorders a cluster into two non-empty halves, each in canonical order; `None` if the centres of
-/// all its items coincide, so that no cut is better than another.
-pub fn partition(items: &[Item], cluster: &mut [u32]) -> Option<Halves> {
+/// all its items coincide, so that no cut is better than another. `centers` is the box around them.
+pub fn partition(items: &[Item], cluster: &mut [u32], centers: &Aabb) -> Option<Halves> {
     if let [left, right] = *cluster {
-        let cost = [left, right].map(|at| Bin::of(&items[at as usize]).cost());
-        return Some(Halves { left_count: 1, cost });
+        let halves = [left, right].map(|at| &items[at as usize]);
+        return Some(Halves {
+            left_count: 1,
+            cost: halves.map(|item| Bin::of(item).cost()),
+            centers: halves.map(|item| Aabb::around([item.center().into()])),
+        });
     }
-    let centers = center_box(items, cluster);
     if cluster.len() <= EXACT_UP_TO {
-        partition_exactly(items, cluster, &centers)
+        partition_exactly(items, cluster, centers)
     } else {
-        partition_binned(items, cluster, &centers)
+        partition_binned(items, cluster, centers)
     }
 }
 
-/// The box around the items' centres.
-fn center_box(items: &[Item], cluster: &[u32]) -> Aabb {
-    let around = |part: &[u32]| Aabb::around(part.iter().map(|&at| items[at as usize].center()));
-    if cluster.len() <= CHUNK {
-        around(cluster)
-    } else {
-        cluster.par_chunks(CHUNK).map(around).reduce(|| Aabb::EMPTY, |a, b| a.union(&b))
+/// The box around the centres of items.
+pub fn center_box(items: &[Item]) -> Aabb {
+    let around = |part: &[Item]| {
+        let mut centers = Centers::NONE;
+        part.iter().for_each(|item| centers.add(item.center()));
+        centers
+    };
+    items.par_chunks(CHUNK).map(around).reduce(|| Centers::NONE, Centers::and).aabb()
+}
+
+/// A box around some centres.
+#[derive(Clone, Copy)]
+struct Centers {
+    min: Vec3A,
+    max: Vec3A,
+}
+
+impl Centers {
+    const NONE: Centers = Centers { min: Vec3A::INFINITY, max: Vec3A::NEG_INFINITY };
+
+    #[inline]
+    fn add(&mut self, center: Vec3A) {
+        (self.min, self.max) = (self.min.min(center), self.max.max(center));
+    }
+
+    fn and(self, other: Centers) -> Centers {
+        Centers { min: self.min.min(other.min), max: self.max.max(other.max) }
+    }
+
+    fn aabb(&self) -> Aabb {
+        Aabb { min: self.min.into(), max: self.max.into() }
     }
 }
 
@@ -79,7 +108,7 @@ fn regularisation(centers: &Aabb) -> [Option<f64>; 3] {
 fn partition_exactly(items: &[Item], cluster: &mut [u32], centers: &Aabb) -> Option<Halves> {
     let count = cluster.len();
     let mut best: Option<Cut> = None;
-    let mut entries = [(Vec3::ZERO, Bin::EMPTY); EXACT_UP_TO];
+    let mut entries = [(Vec3A::ZERO, Bin::EMPTY); EXACT_UP_TO];
     for (entry, &at) in entries.iter_mut().zip(cluster.iter()) {
         let item = &items[at as usize];
         *entry = (item.center(), Bin::of(item));
@@ -109,7 +138,13 @@ fn partition_exactly(items: &[Item], cluster: &mut [u32], centers: &Aabb) -> Opt
     for (place, i) in cluster.iter_mut().zip(order) {
         *place = places[usize::from(i)];
     }
-    Some(Halves { left_count, cost: cut.cost })
+    let around = |part: &[u8]| {
+        let mut centers = Centers::NONE;
+        part.iter().for_each(|&i| centers.add(entries[usize::from(i)].0));
+        centers.aabb()
+    };
+    let centers = [around(&order[..left_count]), around(&order[left_count..count])];
+    Some(Halves { left_count, cost: cut.cost, centers })
 }
 
 fn partition_binned(items: &[Item], cluster: &mut [u32], centers: &Aabb) -> Option<Halves> {
@@ -144,8 +179,9 @@ fn partition_binned(items: &[Item], cluster: &mut [u32], centers: &Aabb) -> Opti
         }
     }
     let Cut { axis, after, cost, .. } = best?;
-    let is_left = |place: u32| slabs.of(items[place as usize].center())[axis] <= after;
-    Some(Halves { left_count: move_to_front(cluster, is_left), cost })
+    let is_left = |center: Vec3A| slabs.of(center)[axis] <= after;
+    let (left_count, centers) = move_to_front(items, cluster, is_left);
+    Some(Halves { left_count, cost, centers: centers.map(|centers| centers.aabb()) })
 }
 
 /// Tries every cut between bins; keeps the first of equals.
@@ -171,53 +207,66 @@ fn cheapest_cut(bins: &[Bin], axis: usize, kr: f64, best: &mut Option<Cut>) {
 
 /// Which slab of each axis a point is in.
 struct Slabs {
-    min: Vec3,
-    per_metre: Vec3,
+    min: Vec3A,
+    per_metre: Vec3A,
 }
 
 impl Slabs {
     fn new(centers: &Aabb) -> Slabs {
         let extent = centers.extent();
         let per_metre = extent.to_array().map(|e| if e > 0.0 { BINS as f32 / e } else { 0.0 });
-        Slabs { min: centers.min, per_metre: Vec3::from_array(per_metre) }
+        Slabs { min: centers.min.into(), per_metre: Vec3A::from_array(per_metre) }
     }
 
     #[inline]
-    fn of(&self, p: Vec3) -> [usize; 3] {
+    fn of(&self, p: Vec3A) -> [usize; 3] {
         let at = (p - self.min) * self.per_metre;
         at.to_array().map(|slab| (slab as usize).min(BINS - 1))
     }
 }
 
-/// Brings what fulfils a condition to the front and counts it; both parts keep their order.
-fn move_to_front(cluster: &mut [u32], wanted: impl Fn(u32) -> bool + Sync) -> usize {
+/// Brings the items whose centres fulfil a condition to the front and counts them; both parts keep
+/// their order. Returns the boxes around the centres of both, too.
+fn move_to_front(
+    items: &[Item],
+    cluster: &mut [u32],
+    wanted: impl Fn(Vec3A) -> bool + Sync,
+) -> (usize, [Centers; 2]) {
+    let move_part = |part: &mut [u32]| move_part_to_front(items, part, &wanted);
     if cluster.len() <= CHUNK {
-        return move_part_to_front(cluster, &wanted);
+        return move_part(cluster);
     }
-    let parts = cluster.par_chunks_mut(CHUNK);
-    let counts: Vec<usize> = parts.map(|part| move_part_to_front(part, &wanted)).collect();
+    let parts: Vec<_> = cluster.par_chunks_mut(CHUNK).map(move_part).collect();
     let (mut front, mut others) = (0, Vec::with_capacity(cluster.len()));
-    for (i, count) in counts.into_iter().enumerate() {
+    let mut centers = [Centers::NONE; 2];
+    for (i, (count, [left, right])) in parts.into_iter().enumerate() {
         let (start, end) = (i * CHUNK, cluster.len().min((i + 1) * CHUNK));
         others.extend_from_slice(&cluster[start + count..end]);
         cluster.copy_within(start..start + count, front);
         front += count;
+        centers = [centers[0].and(left), centers[1].and(right)];
     }
     cluster[front..].copy_from_slice(&others);
-    front
+    (front, centers)
 }
 
-fn move_part_to_front(part: &mut [u32], wanted: impl Fn(u32) -> bool) -> usize {
-    let (mut front, mut others) = (0, Vec::with_capacity(part.len()));
+fn move_part_to_front(
+    items: &[Item],
+    part: &mut [u32],
+    wanted: impl Fn(Vec3A) -> bool,
+) -> (usize, [Centers; 2]) {
+    let mut centers = [Centers::NONE; 2];
+    let (mut front, mut behind, mut others) = (0, 0, vec![0; part.len()]);
+    // Without branches, which nothing could foretell.
     for at in 0..part.len() {
         let place = part[at];
-        if wanted(place) {
-            part[front] = place;
-            front += 1;
-        } else {
-            others.push(place);
-        }
+        let center = items[place as usize].center();
+        let is_left = wanted(center);
+        (part[front], others[behind]) = (place, place);
+        front += usize::from(is_left);
+        behind += usize::from(!is_left);
+        centers[usize::from(!is_left)].add(center);
     }
-    part[front..].copy_from_slice(&others);
-    front
+    part[front..].copy_from_slice(&others[..behind]);
+    (front, centers)
 }

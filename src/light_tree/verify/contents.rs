@@ -36,8 +36,7 @@ impl<D: AsRef<[u8]> + Sync> LightTree<D> {
                     let record = Record::Lane { group: number, lane: lane as u8 };
                     Err(Violation { rule, record })
                 };
-                let Some(node) = group.node(lane) else { continue };
-                match node.link() {
+                match group.link(lane) {
                     Link::Emitter(emitter) => {
                         let at = emitter.wrapping_sub(own.start) as usize;
                         match seen[..most].get_mut(at) {
@@ -53,6 +52,7 @@ impl<D: AsRef<[u8]> + Sync> LightTree<D> {
                             return broken(rules::INSTANCE_IS_EARLIER);
                         };
                         let tree_below = &self.trees()[instance.tree as usize];
+                        let node = group.node(lane).expect("a lane that leads somewhere");
                         if let Some(rule) = sticks_out(&node, instance, tree_below) {
                             return broken(rule);
                         }
@@ -67,9 +67,8 @@ impl<D: AsRef<[u8]> + Sync> LightTree<D> {
             }
         }
         check(leaves == tree.leaf_count, rules::LEAVES_ARE_COUNTED, row)?;
-        let is_still = |tree: &TreeRow| TreeKind::of(tree) == Some(TreeKind::Still);
-        let has_still = self.trees().iter().any(is_still);
-        let expected_below = usize::from(kind == Some(TreeKind::Frame) && has_still);
+        let expected_below =
+            usize::from(kind == Some(TreeKind::Frame) && self.still_tree().is_some());
         placed.sort_unstable();
         let expected = match kind {
             Some(TreeKind::Still) => self.lights_of_class(LightRow::PLACED),

@@ -5,30 +5,41 @@ use crate::light_tree::group::WIDTH;
 use crate::light_tree::node::MOST;
 use crate::light_tree::records::{FrameRow, LightRow, NO_TREE, TreeKind};
 use crate::light_tree::tree::LightTree;
+use rayon::prelude::*;
+
+/// The number of the emitter behind a light's.
+fn next_emitter(light: &LightRow) -> u64 {
+    u64::from(light.first_emitter) + u64::from(light.emitter_count)
+}
 
 impl<D: AsRef<[u8]> + Sync> LightTree<D> {
     /// The lights' rows.
     pub(super) fn verify_lights(&self) -> Checked {
-        let mut next_emitter = 0_u64;
-        let mut before: Option<(u32, &str)> = None;
-        for (row, light) in self.lights().iter().enumerate() {
-            let follows = u64::from(light.first_emitter) == next_emitter;
-            check(follows, rules::EMITTERS_FOLLOW, row)?;
-            next_emitter += u64::from(light.emitter_count);
-            check(matches!(light.class, 0..=3 | 5 | 7), rules::CLASS_IS_KNOWN, row)?;
-            let is_known = light.look.is_sound() || self.is_of_later_version();
-            check(is_known, rules::LOOK_IS_KNOWN, row)?;
-            let is_number = light.energy.is_finite() && light.energy >= 0.0;
-            check(is_number, rules::LIGHT_ENERGY_IS_A_NUMBER, row)?;
-            let now = (light.class, self.light_path(light));
-            check(!now.1.is_empty(), rules::PATH_IS_TEXT, row)?;
-            check(before.is_none_or(|before| before < now), rules::LIGHTS_ARE_IN_ORDER, row)?;
-            before = Some(now);
-        }
+        let lights = self.lights();
+        let broken = (0..lights.len()).into_par_iter().map(|row| self.verify_light(row));
+        broken.find_first(Result::is_err).unwrap_or(Ok(()))?;
         // More leaves than lanes are not to be looked for.
         let own = u64::from(self.first_of_class(LightRow::PLACED));
         let lanes = (self.groups().len() * WIDTH) as u64;
-        check_all(next_emitter < MOST as u64 && own <= lanes, rules::EMITTERS_ARE_NUMBERED)
+        let is_numbered = lights.last().map_or(0, next_emitter) < MOST as u64 && own <= lanes;
+        check_all(is_numbered, rules::EMITTERS_ARE_NUMBERED)
+    }
+
+    /// One of them, and that it comes after the one before it.
+    fn verify_light(&self, row: usize) -> Checked {
+        let light = &self.lights()[row];
+        let before = row.checked_sub(1).map(|before| &self.lights()[before]);
+        let follows = u64::from(light.first_emitter) == before.map_or(0, next_emitter);
+        check(follows, rules::EMITTERS_FOLLOW, row)?;
+        check(matches!(light.class, 0..=3 | 5 | 7), rules::CLASS_IS_KNOWN, row)?;
+        let is_known = light.look.is_sound() || self.is_of_later_version();
+        check(is_known, rules::LOOK_IS_KNOWN, row)?;
+        let is_number = light.energy.is_finite() && light.energy >= 0.0;
+        check(is_number, rules::LIGHT_ENERGY_IS_A_NUMBER, row)?;
+        check(!self.light_path(light).is_empty(), rules::PATH_IS_TEXT, row)?;
+        let place = |light: &LightRow| (light.class, self.path_bytes(light));
+        let ascends = before.is_none_or(|before| place(before) < place(light));
+        check(ascends, rules::LIGHTS_ARE_IN_ORDER, row)
     }
 
     /// First emitter and count of the lights of a class.
@@ -40,8 +51,7 @@ impl<D: AsRef<[u8]> + Sync> LightTree<D> {
     /// The frames' rows, and the entries of forced lights that they, or the file, have.
     pub(super) fn verify_frames(&self) -> Checked {
         let kind_of = |row: u32| self.trees().get(row as usize).and_then(TreeKind::of);
-        let is = |kind| move |row: &_| TreeKind::of(row) == Some(kind);
-        let has_still = self.trees().iter().any(is(TreeKind::Still));
+        let has_still = self.still_tree().is_some();
         let changes = [LightRow::CHANGES, LightRow::CHANGES | LightRow::PLACED];
         let any_changes = self.lights().iter().any(|light| changes.contains(&light.class));
         let mut before = None;

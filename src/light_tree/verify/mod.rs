@@ -9,11 +9,12 @@ mod walkable;
 
 use super::group::WIDTH;
 use super::node::{Link, MOST};
-use super::records::TreeKind;
+use super::records::{TreeKind, TreeRow};
 use super::tree::LightTree;
 use crate::math::Similarity;
 use crate::store::{Record, Rule, StoreError, Violation};
 use groups::verify_groups;
+use rayon::prelude::*;
 
 type Checked<T = ()> = Result<T, Violation>;
 
@@ -33,21 +34,27 @@ impl<D: AsRef<[u8]> + Sync> LightTree<D> {
     /// # Errors
     /// The first rule that is broken, with its section and record.
     pub fn verify(&self) -> Result<(), StoreError> {
-        self.verify_checksums()?;
-        self.verify_rules().map_err(StoreError::Broken)?;
+        // Side by side; the first violation is told, whatever is found first.
+        let (sums, rules) = rayon::join(|| self.verify_checksums(), || self.verify_rules());
+        sums?;
+        rules.map_err(StoreError::Broken)?;
         self.note_walkable();
         Ok(())
     }
 
     fn verify_rules(&self) -> Checked {
-        self.verify_lights()?;
-        self.verify_trees()?;
-        self.verify_instances()?;
-        let mut seen = Vec::new();
-        for (row, tree) in self.trees().iter().enumerate() {
-            verify_groups(tree, self.groups_of(tree))?;
-            self.verify_contents(row, tree, &mut seen)?;
-        }
+        let trees = || self.verify_trees().and_then(|()| self.verify_instances());
+        let (lights, trees) = rayon::join(|| self.verify_lights(), trees);
+        lights?;
+        trees?;
+        let whole = |row, tree: &TreeRow, seen: &mut Vec<u32>| {
+            let groups = || verify_groups(tree, self.groups_of(tree));
+            let (groups, contents) = rayon::join(groups, || self.verify_contents(row, tree, seen));
+            groups.and(contents)
+        };
+        let trees = self.trees().par_iter().enumerate();
+        let trees = trees.map_init(Vec::new, |seen, (row, tree)| whole(row, tree, seen));
+        trees.find_first(Result::is_err).unwrap_or(Ok(()))?;
         self.verify_frames()
     }
 
