@@ -158,7 +158,7 @@ impl<'a, D: AsRef<[u8]>, F: FnMut(&Stop) -> bool> Walk<'a, D, F> {
 mod tests {
     use super::*;
     use crate::bounds::{Cone, LightBounds};
-    use crate::light_tree::{LightLook, LightRow, LightSummary, LightTreeWriter};
+    use crate::light_tree::{LightList, LightLook, LightRow, LightSummary, LightTreeWriter};
     use crate::math::Similarity;
     use crate::store::AlignedBytes;
     use glam::{Quat, Vec3};
@@ -188,7 +188,7 @@ mod tests {
             let (path, fingerprint, look) = (path.into(), [0; 32], LightLook::default());
             LightSummary { path, fingerprint, emitter_count, energy, class, look }
         });
-        let tree = LightTree::open(writer.finish(&lights, "{}", [0; 32])).unwrap();
+        let tree = LightTree::open(writer.finish(&LightList::new(&lights), "{}", [0; 32])).unwrap();
         tree.verify().unwrap();
         tree
     }

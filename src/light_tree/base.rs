@@ -10,7 +10,7 @@ use super::leaves::Leaves;
 use super::node::Node;
 use super::records::{LightRow, TreeKind, TreeRow};
 use super::tree::LightTree;
-use super::writer::LightSummary;
+use super::writer::{LightList, LightSummary};
 use rayon::prelude::*;
 
 /// Leaves that are looked up by one task.
@@ -19,9 +19,9 @@ const CHUNK: usize = 1 << 12;
 /// The base of a build.
 pub struct Base<'a> {
     tree: LightTree<&'a [u8]>,
-    /// For each light of the new file its first emitter, ascending.
-    firsts: Vec<u32>,
-    /// And the first emitter of the light of the base that it equals.
+    /// The lights of the new file.
+    list: &'a LightList<'a>,
+    /// For each of them the first emitter of the light of the base that it equals.
     old_firsts: Vec<Option<u32>>,
     /// The first emitters of lights that are placed, and the rows of their trees; both ascending.
     placed: Vec<(u32, u32)>,
@@ -30,24 +30,14 @@ pub struct Base<'a> {
 impl<'a> Base<'a> {
     /// Compares the lights of a new file, in their order, with those of an earlier one, which must be
     /// sound (see [`verify`](LightTree::verify)) and built by this version of the algorithm.
-    pub fn new<D: AsRef<[u8]>>(tree: &'a LightTree<D>, lights: &[LightSummary]) -> Base<'a> {
+    pub fn new<D: AsRef<[u8]>>(tree: &'a LightTree<D>, list: &'a LightList<'a>) -> Base<'a> {
         let tree = tree.by_reference();
-        let mut next = 0;
-        let first = |light: &LightSummary| {
-            next += light.emitter_count;
-            next - light.emitter_count
-        };
         let placed = tree.instances().iter().map(|row| (row.first_emitter, row.tree));
         let is_shared = |(_, row): &(u32, u32)| kind_of(&tree, *row) == Some(TreeKind::Shared);
         let mut placed: Vec<_> = placed.filter(is_shared).collect();
         placed.sort_unstable();
         placed.dedup();
-        Base {
-            firsts: lights.iter().map(first).collect(),
-            old_firsts: same_lights(&tree, lights),
-            placed,
-            tree,
-        }
+        Base { list, old_firsts: same_lights(&tree, list.lights), placed, tree }
     }
 
     /// The `nth` tree of its own that a light has, if the light has not changed.
@@ -110,14 +100,15 @@ impl<'a> Base<'a> {
     ) -> Earlier<'_> {
         let old: Leaves = self.tree.leaves_of(row, own);
         let still = self.still_row().map(|row| bytemuck::bytes_of(&row.root));
+        let starts = &self.list.starts;
         let slot = |leaf: Leaf, light: &mut usize| match leaf {
             Leaf::Below(tree) => {
                 old.below.filter(|_| still == Some(bytemuck::bytes_of(&tree.root)))
             }
             Leaf::Emitter(emitter) => {
-                let behind = |first: &u32| *first <= emitter;
-                *light += self.firsts[*light..].iter().skip(1).take_while(|&f| behind(f)).count();
-                let within = emitter.checked_sub(*self.firsts.get(*light)?)?;
+                let later = &starts.get(*light + 1..).unwrap_or_default();
+                *light += later.iter().take_while(|(first, _)| *first <= emitter).count();
+                let within = emitter.checked_sub(starts.get(*light)?.0)?;
                 let old_emitter = self.old_firsts[*light]? + within;
                 old.find(old_emitter).map(|(slot, _)| slot)
             }
@@ -138,7 +129,10 @@ impl<'a> Base<'a> {
     /// The place of the light that a leaf belongs to, if it belongs to one.
     fn light_before(&self, leaf: Leaf) -> usize {
         match leaf {
-            Leaf::Emitter(e) => self.firsts.partition_point(|&first| first <= e).saturating_sub(1),
+            Leaf::Emitter(emitter) => {
+                let behind = self.list.starts.partition_point(|(first, _)| *first <= emitter);
+                behind.saturating_sub(1)
+            }
             Leaf::Below(_) => 0,
         }
     }
@@ -164,20 +158,24 @@ fn same_lights(tree: &LightTree<&[u8]>, lights: &[LightSummary]) -> Vec<Option<u
     let is_same = |row: &LightRow, light: &LightSummary| {
         (row.class, row.fingerprint) == (light.class, light.fingerprint)
     };
-    // Most often all are the same but some in the middle.
-    let differs = |(row, light): (&LightRow, &LightSummary)| !is_same(row, light);
-    let shorter = rows.len().min(lights.len());
-    let pairs = rows.par_iter().zip(lights);
-    let ahead = pairs.position_first(differs).unwrap_or(shorter);
-    let pairs = rows[ahead..].par_iter().rev().zip(lights[ahead..].par_iter().rev());
-    let behind = pairs.position_first(differs).unwrap_or(shorter - ahead);
-    let (old_end, new_end) = (rows.len() - behind, lights.len() - behind);
-    let at_same_place = |new: usize| {
-        let old =
-            if new < ahead { Some(new) } else { new.checked_sub(new_end).map(|n| old_end + n) };
-        old.map(|old| rows[old].first_emitter)
+    let at = |old: Option<usize>, new: usize| {
+        let row = rows.get(old?)?;
+        is_same(row, &lights[new]).then_some(row.first_emitter)
     };
-    let mut found: Vec<_> = (0..lights.len()).into_par_iter().map(at_same_place).collect();
+    // Most often all are the same but some in the middle: they stand as far from the start as they
+    // did, or as far from the end.
+    let mut found: Vec<_> =
+        (0..lights.len()).into_par_iter().map(|new| at(Some(new), new)).collect();
+    let ahead = found.iter().take_while(|found| found.is_some()).count();
+    let longer = rows.len() as isize - lights.len() as isize;
+    if longer != 0 {
+        let rest = found[ahead..].par_iter_mut().enumerate();
+        rest.for_each(|(i, found)| *found = at((ahead + i).checked_add_signed(longer), ahead + i));
+    }
+    let same_to_end = found[ahead..].iter().rev().take_while(|found| found.is_some()).count();
+    let behind = same_to_end.min(rows.len() - ahead);
+    let (old_end, new_end) = (rows.len() - behind, lights.len() - behind);
+    found[ahead..new_end].fill(None);
     // Both stand in the order of class and path, and most have a partner where the other list is.
     let (mut gone, mut come) = (Vec::new(), Vec::new());
     let (mut old, mut new) = (ahead, ahead);

@@ -60,4 +60,4 @@ pub use tree::{LightTree, NoSuchFrame};
 pub use variance::Moments;
 pub use verify::rules::RULES;
 pub use viewer::{DistanceOnly, Receiver, Viewer};
-pub use writer::{LightSummary, LightTreeWriter};
+pub use writer::{LightList, LightSummary, LightTreeWriter};

@@ -29,6 +29,55 @@ pub struct LightSummary {
     pub look: LightLook,
 }
 
+/// The lights of a file, in their order, and where each begins.
+pub struct LightList<'a> {
+    pub(super) lights: &'a [LightSummary],
+    /// The first emitter of each, and the place of its path among all paths, bytes.
+    pub(super) starts: Vec<(u32, u32)>,
+    /// How long all paths are together, bytes.
+    path_length: usize,
+}
+
+impl<'a> LightList<'a> {
+    /// The list of some lights. Emitters are numbered in their order.
+    pub fn new(lights: &'a [LightSummary]) -> LightList<'a> {
+        let size = |light: &LightSummary| (light.emitter_count, light.path.len() as u32);
+        // Summaries are large: they are read side by side, then summed one by one.
+        let mut starts: Vec<_> = lights.par_iter().map(size).collect();
+        let mut next = (0, 0);
+        for start in &mut starts {
+            let (emitters, length) = std::mem::replace(start, next);
+            next = (next.0 + emitters, next.1 + length);
+        }
+        LightList { lights, starts, path_length: next.1 as usize }
+    }
+
+    /// A row of the section of lights.
+    fn row(&self, at: usize) -> LightRow {
+        let light = &self.lights[at];
+        let (first_emitter, path_offset) = self.starts[at];
+        LightRow {
+            fingerprint: light.fingerprint,
+            first_emitter,
+            emitter_count: light.emitter_count,
+            path_offset,
+            path_length: light.path.len() as u32,
+            energy: light.energy,
+            class: light.class,
+            look: light.look,
+        }
+    }
+
+    /// Writes the section of paths.
+    fn write_paths(&self, mut place: &mut [u8]) {
+        for path in self.lights.iter().map(|light| light.path.as_bytes()) {
+            let (own, behind) = place.split_at_mut(path.len());
+            own.copy_from_slice(path);
+            place = behind;
+        }
+    }
+}
+
 /// Builds the trees of a shot, one after the other, and writes them down.
 #[derive(Default)]
 pub struct LightTreeWriter<'a> {
@@ -68,13 +117,16 @@ impl<'a> LightTreeWriter<'a> {
         stands_for: impl Fn(usize) -> Link + Sync,
     ) -> Option<u32> {
         let first_group = self.groups.len();
+        let mut groups = std::mem::take(&mut self.groups);
         let (count, leaf) = (bounds.len(), |i| self.leaf(stands_for(i)));
-        let earlier = self.base.as_ref().and_then(|base| match kind {
+        let earlier = || match kind {
             TreeKind::Shared => None,
-            TreeKind::Still => base.still(count, leaf),
-            TreeKind::Frame => base.frame(self.frames.len(), count, leaf),
-        });
-        let (root, reused) = build_tree(bounds, &stands_for, earlier, &mut self.groups)?;
+            TreeKind::Still => self.base.as_ref()?.still(count, leaf),
+            TreeKind::Frame => self.base.as_ref()?.frame(self.frames.len(), count, leaf),
+        };
+        let built = build_tree(bounds, &stands_for, earlier, &mut groups);
+        self.groups = groups;
+        let (root, reused) = built?;
         self.reused += reused;
         self.trees.push(TreeRow {
             first_group: first_group as u32,
@@ -168,21 +220,8 @@ impl<'a> LightTreeWriter<'a> {
         self.forced.extend_from_slice(instances);
     }
 
-    /// The bytes of the file. Emitters are numbered in the order of the lights.
-    pub fn finish(
-        self,
-        lights: &[LightSummary],
-        meta: &str,
-        fingerprint: [u8; 32],
-    ) -> AlignedBytes {
-        let mut end = (0, 0);
-        let mut start = |light: &LightSummary| {
-            let start = end;
-            end = (start.0 + light.emitter_count, start.1 + light.path.len() as u32);
-            start
-        };
-        // The first emitter of each, and where its path begins.
-        let starts: Vec<(u32, u32)> = lights.iter().map(&mut start).collect();
+    /// The bytes of the file.
+    pub fn finish(self, lights: &LightList, meta: &str, fingerprint: [u8; 32]) -> AlignedBytes {
         let mut file = ContainerWriter::default();
         file.section(records::META, false, meta.as_bytes());
         file.section(records::TREES, true, &self.trees);
@@ -196,30 +235,13 @@ impl<'a> LightTreeWriter<'a> {
         if !self.forced.is_empty() {
             file.section(records::FORCED, true, &self.forced);
         }
-        file.section_with(records::LIGHTS, true, lights.len(), |rows: &mut [LightRow]| {
-            let parts = (rows, lights, &starts).into_par_iter();
-            parts.for_each(|(row, light, start)| *row = row_of(light, *start));
+        let count = lights.lights.len();
+        file.section_with(records::LIGHTS, true, count, |rows: &mut [LightRow]| {
+            rows.par_iter_mut().enumerate().for_each(|(at, row)| *row = lights.row(at));
         });
-        file.section_with(records::PATHS, true, end.1 as usize, |mut rest: &mut [u8]| {
-            for path in lights.iter().map(|light| light.path.as_bytes()) {
-                let (place, behind) = rest.split_at_mut(path.len());
-                place.copy_from_slice(path);
-                rest = behind;
-            }
+        file.section_with(records::PATHS, true, lights.path_length, |place: &mut [u8]| {
+            lights.write_paths(place);
         });
         file.finish(fingerprint)
-    }
-}
-
-fn row_of(light: &LightSummary, (first_emitter, path_offset): (u32, u32)) -> LightRow {
-    LightRow {
-        fingerprint: light.fingerprint,
-        first_emitter,
-        emitter_count: light.emitter_count,
-        path_offset,
-        path_length: light.path.len() as u32,
-        energy: light.energy,
-        class: light.class,
-        look: light.look,
     }
 }

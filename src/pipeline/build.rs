@@ -3,7 +3,9 @@
 use super::Survey;
 use super::survey::{Group, PlacedLight};
 use crate::bounds::{Aabb, Cone, LightBounds};
-use crate::light_tree::{ALGORITHM_VERSION, Base, LightTree, LightTreeWriter, Link, TreeKind};
+use crate::light_tree::{
+    ALGORITHM_VERSION, Base, LightList, LightTree, LightTreeWriter, Link, TreeKind,
+};
 use crate::math::Similarity;
 use crate::store::AlignedBytes;
 use glam::Vec3;
@@ -31,7 +33,8 @@ pub struct Rebuilt {
 /// over what stands still; and one a frame over that tree and what changes. The same survey gives the
 /// same bytes.
 pub fn build_tree(survey: &Survey, options: &BuildOptions) -> AlignedBytes {
-    write(survey, options, LightTreeWriter::default()).bytes
+    let lights = LightList::new(&survey.lights);
+    write(survey, &lights, options, LightTreeWriter::default()).bytes
 }
 
 /// The same, in less time: copies every subtree of an earlier file whose lights have not changed. The
@@ -41,10 +44,17 @@ pub fn rebuild_tree<D: AsRef<[u8]>>(
     options: &BuildOptions,
     base: &LightTree<D>,
 ) -> Rebuilt {
-    write(survey, options, LightTreeWriter::upon(Base::new(base, &survey.lights)))
+    let lights = LightList::new(&survey.lights);
+    let writer = LightTreeWriter::upon(Base::new(base, &lights));
+    write(survey, &lights, options, writer)
 }
 
-fn write(survey: &Survey, options: &BuildOptions, writer: LightTreeWriter) -> Rebuilt {
+fn write(
+    survey: &Survey,
+    lights: &LightList,
+    options: &BuildOptions,
+    writer: LightTreeWriter,
+) -> Rebuilt {
     let mut builder = Builder { writer, shared: Vec::new() };
     builder.share(survey);
     let links = builder.links(&survey.still, None);
@@ -66,7 +76,7 @@ fn write(survey: &Survey, options: &BuildOptions, writer: LightTreeWriter) -> Re
         ALGORITHM: ALGORITHM_VERSION,
     });
     let (leaves, reused) = (writer.leaf_count(), writer.reused_leaf_count());
-    let bytes = writer.finish(&survey.lights, &meta.to_string(), survey.fingerprint);
+    let bytes = writer.finish(lights, &meta.to_string(), survey.fingerprint);
     Rebuilt { bytes, leaves, reused }
 }
 

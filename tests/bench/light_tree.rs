@@ -7,7 +7,8 @@ mod lights;
 use candelabra::bounds::{Aabb, Cone, LightBounds};
 use candelabra::emitter::Emitters;
 use candelabra::light_tree::{
-    Glossy, LightLook, LightSummary, LightTree, LightTreeWriter, Link, Lobes, Receiver, TreeKind,
+    Glossy, LightList, LightLook, LightSummary, LightTree, LightTreeWriter, Link, Lobes, Receiver,
+    TreeKind,
 };
 use candelabra::math::random::{hash, widen};
 use candelabra::pipeline::{self, BuildOptions, open_tree};
@@ -55,7 +56,7 @@ fn build(bounds: &[LightBounds]) -> AlignedBytes {
         class: 0,
         look: LightLook::default(),
     };
-    writer.finish(&[light], "{}", [0; 32])
+    writer.finish(&LightList::new(&[light]), "{}", [0; 32])
 }
 
 fn benchmarks(criterion: &mut Criterion) {

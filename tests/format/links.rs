@@ -4,7 +4,8 @@ use crate::bytes::Parts;
 use crate::probe::{probe, repaired};
 use candelabra::bounds::{Aabb, Cone, LightBounds};
 use candelabra::light_tree::{
-    LightLook, LightSummary, LightTree, LightTreeWriter, Link, Receiver, Splitting, TreeKind,
+    LightList, LightLook, LightSummary, LightTree, LightTreeWriter, Link, Receiver, Splitting,
+    TreeKind,
 };
 use candelabra::store::AlignedBytes;
 use glam::Vec3;
@@ -32,7 +33,7 @@ fn points(count: u32) -> Parts {
         class: 0,
         look: LightLook::default(),
     };
-    Parts::of(writer.finish(&[light], "{}", [0; 32]).as_ref())
+    Parts::of(writer.finish(&LightList::new(&[light]), "{}", [0; 32]).as_ref())
 }
 
 /// Points, and in the place of their tree `count` groups, all of whose lanes that `leads` says lead on to

@@ -5,7 +5,9 @@ use crate::golden::{golden_bytes, path};
 use crate::probe::{probe, repaired};
 use candelabra::bounds::{Aabb, Cone, LightBounds};
 use candelabra::diff::{DiffOptions, Side, compare};
-use candelabra::light_tree::{LightLook, LightSummary, LightTree, LightTreeWriter, Link, TreeKind};
+use candelabra::light_tree::{
+    LightList, LightLook, LightSummary, LightTree, LightTreeWriter, Link, TreeKind,
+};
 use candelabra::store::{AlignedBytes, StoreError};
 use glam::Vec3;
 
@@ -137,7 +139,7 @@ fn no_frames_are_no_frames() {
         class: 0,
         look: LightLook::default(),
     };
-    let mut parts = Parts::of(writer.finish(&[light], "{}", [4; 32]).as_ref());
+    let mut parts = Parts::of(writer.finish(&LightList::new(&[light]), "{}", [4; 32]).as_ref());
     let before = parts.file();
     parts.sections.push(Section { name: *b"FRAM", required: 1, element: 16, bytes: Vec::new() });
     parts.section("LGHT")[0] ^= 1;

@@ -2,7 +2,9 @@
 
 use crate::support::{Tree, emitters, nodes, tree_over};
 use candelabra::bounds::{Aabb, Cone, LightBounds};
-use candelabra::light_tree::{LightTree, LightTreeWriter, Link, Receiver, TreeKind, WIDTH};
+use candelabra::light_tree::{
+    LightList, LightTree, LightTreeWriter, Link, Receiver, TreeKind, WIDTH,
+};
 use candelabra::store::AlignedBytes;
 use glam::Vec3;
 use proptest::prelude::*;
@@ -54,7 +56,7 @@ proptest! {
     ) {
         let mut writer = LightTreeWriter::default();
         writer.add_tree(TreeKind::Still, &bounds, |i| Link::Emitter(i as u32));
-        let bytes = writer.finish(&[], "", [0; 32]);
+        let bytes = writer.finish(&LightList::new(&[]), "", [0; 32]);
         let mut damaged = bytes.as_ref().to_vec();
         damaged[at.index(bytes.as_ref().len())] ^= 1 << bit;
         let Ok(tree) = LightTree::open(AlignedBytes::copy_of(&damaged)) else { return Ok(()) };

@@ -4,7 +4,7 @@
 use crate::support::{Tree, direction, emitter, emitters, position};
 use candelabra::bounds::{Aabb, Cone, LightBounds};
 use candelabra::light_tree::{
-    LightLook, LightRow, LightSummary, LightTree, LightTreeWriter, Link, TreeKind,
+    LightList, LightLook, LightRow, LightSummary, LightTree, LightTreeWriter, Link, TreeKind,
 };
 use candelabra::math::Similarity;
 use glam::{Affine3A, Mat3, Quat, Vec3};
@@ -127,7 +127,8 @@ impl City {
         } else {
             writer.add_forced(&forced);
         }
-        let tree = LightTree::open(writer.finish(&lights, "{}", [3; 32])).expect("it opens");
+        let tree = LightTree::open(writer.finish(&LightList::new(&lights), "{}", [3; 32]))
+            .expect("it opens");
         (tree, second)
     }
 

@@ -2,8 +2,8 @@
 
 use candelabra::bounds::{Aabb, Cone, LightBounds};
 use candelabra::light_tree::{
-    DistanceOnly, FrameTree, Glossy, LightLook, LightSummary, LightTree, LightTreeWriter, Link,
-    Lobes, Node, Receiver, Segment, Splitting, TreeKind, Viewer,
+    DistanceOnly, FrameTree, Glossy, LightList, LightLook, LightSummary, LightTree,
+    LightTreeWriter, Link, Lobes, Node, Receiver, Segment, Splitting, TreeKind, Viewer,
 };
 use candelabra::store::AlignedBytes;
 use glam::Vec3;
@@ -24,7 +24,8 @@ pub fn tree_over(bounds: &[LightBounds]) -> Tree {
         class: 0,
         look: LightLook::default(),
     };
-    LightTree::open(writer.finish(&[light], "{}", [2; 32])).expect("a tree just written opens")
+    LightTree::open(writer.finish(&LightList::new(&[light]), "{}", [2; 32]))
+        .expect("a tree just written opens")
 }
 
 pub fn direction() -> impl Strategy<Value = Vec3> {

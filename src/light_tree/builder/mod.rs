@@ -41,17 +41,17 @@ const PARALLEL_ABOVE: usize = 4096;
 ///
 /// # Panics
 /// If there are 2^30 bounds or more.
-pub(super) fn build_tree(
+pub(super) fn build_tree<'e>(
     bounds: &[LightBounds],
     link: &(impl Fn(usize) -> Link + Sync),
-    earlier: Option<Earlier>,
+    earlier: impl FnOnce() -> Option<Earlier<'e>> + Send,
     out: &mut Vec<Group>,
 ) -> Option<(LightBounds, usize)> {
     assert!(bounds.len() < MOST, "a tree has fewer than 2^30 leaves");
     if bounds.is_empty() {
         return None;
     }
-    let items = order::canonical(bounds);
+    let (items, earlier) = rayon::join(|| order::canonical(bounds), earlier);
     let centers = saoh::center_box(&items);
     let reuse = earlier.map(|earlier| {
         out.reserve(earlier.groups.len());

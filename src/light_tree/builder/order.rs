@@ -11,16 +11,18 @@ use std::cmp::Ordering;
 
 /// The items along a Morton curve of their centres; equal places by every number they have.
 pub fn canonical(bounds: &[LightBounds]) -> Vec<Item> {
-    // The place on the curve, then the index: one number to sort by.
-    let mut keys: Vec<u128> = (bounds.par_iter().enumerate())
-        .map(|(index, b)| place_on_curve(b.aabb.center()) << 32 | index as u128)
-        .collect();
-    keys.par_sort_unstable();
-    let of = |key: &u128| &bounds[*key as u32 as usize];
-    for run in keys.chunk_by_mut(|a, b| a >> 32 == b >> 32) {
-        run.par_sort_by(|a, b| total_order(of(a), of(b)));
+    let of = |index: u32| &bounds[index as usize];
+    let place = |index: u32| place_on_curve(of(index).aabb.center());
+    let mut keys: Vec<(u64, u32)> =
+        (0..bounds.len() as u32).into_par_iter().map(|index| (place(index).0, index)).collect();
+    keys.par_sort_unstable_by_key(|(coarse, _)| *coarse);
+    for run in keys.chunk_by_mut(|a, b| a.0 == b.0).filter(|run| run.len() > 1) {
+        run.par_sort_unstable_by(|&(_, a), &(_, b)| {
+            let by_place = place(a).1.cmp(&place(b).1);
+            by_place.then_with(|| total_order(of(a), of(b))).then(a.cmp(&b))
+        });
     }
-    keys.par_iter().map(|key| Item::new(of(key), *key as u32)).collect()
+    keys.par_iter().map(|&(_, index)| Item::new(of(index), index)).collect()
 }
 
 /// A total order over every number of the bounds. Equal bounds may swap: nobody can tell, but by the
@@ -36,15 +38,17 @@ pub fn total_order(a: &LightBounds, b: &LightBounds) -> Ordering {
     pairs.map(|(x, y)| x.total_cmp(y)).find(|o| o.is_ne()).unwrap_or_else(|| ta.cmp(&tb))
 }
 
-/// Interleaved bits of the coordinates, 32 an axis. Their patterns, not their values: those ascend
-/// alike, over all magnitudes, and need no box around everything to be relative to.
-fn place_on_curve(p: Vec3) -> u128 {
+/// Interleaved bits of the coordinates: the upper 21 of each axis, which tell most places apart, and
+/// the lower 11. Their patterns, not their values: those ascend alike, over all magnitudes, and need
+/// no box around everything to be relative to.
+#[inline]
+fn place_on_curve(p: Vec3) -> (u64, u64) {
     let axes = p.to_array().map(ascending_bits);
     let interleave = |bits: [u32; 3]| {
         let [x, y, z] = bits.map(|bits| spread(bits.into()));
-        u128::from(x | y << 1 | z << 2)
+        x | y << 1 | z << 2
     };
-    interleave(axes.map(|bits| bits >> 11)) << 33 | interleave(axes.map(|bits| bits & 0x7ff))
+    (interleave(axes.map(|bits| bits >> 11)), interleave(axes.map(|bits| bits & 0x7ff)))
 }
 
 /// The bits of a number, changed so that they ascend with it.

@@ -50,8 +50,9 @@ struct Subtree {
 impl<'a> Reuse<'a> {
     pub fn new(earlier: Earlier<'a>, items: &[Item], bounds: &[LightBounds]) -> Reuse<'a> {
         let Earlier { groups, slots } = earlier;
-        let (subtrees, height) = measure(groups);
-        let mut slots: Vec<u32> = items.par_iter().map(|item| slots[item.index as usize]).collect();
+        let slot = |item: &Item| slots[item.index as usize];
+        let ((subtrees, height), mut slots) =
+            rayon::join(|| measure(groups), || items.par_iter().map(slot).collect::<Vec<u32>>());
         forget_swapped(&mut slots, groups, items, bounds);
         let mut inputs = vec![CHANGED; groups.len() * WIDTH];
         for (&slot, item) in slots.iter().zip(items).filter(|(slot, _)| **slot != CHANGED) {
@@ -138,6 +139,9 @@ fn measure(groups: &[Group]) -> (Vec<Subtree>, usize) {
 /// Items with the same bounds follow each other by their numbers. Where they followed each other
 /// otherwise in the earlier tree, a build would swap them: then none of them counts as unchanged.
 fn forget_swapped(slots: &mut [u32], groups: &[Group], items: &[Item], bounds: &[LightBounds]) {
+    if !items.par_windows(2).any(|pair| pair[0].min == pair[1].min) {
+        return;
+    }
     let of = |item: &Item| &bounds[item.index as usize];
     let old = |slot: u32| groups[slot as usize / WIDTH].link(slot as usize % WIDTH);
     let mut first = 0;

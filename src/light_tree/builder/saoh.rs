@@ -179,7 +179,7 @@ fn partition_binned(items: &[Item], cluster: &mut [u32], centers: &Aabb) -> Opti
         }
     }
     let Cut { axis, after, cost, .. } = best?;
-    let is_left = |center: Vec3A| slabs.of(center)[axis] <= after;
+    let is_left = |center: Vec3A| slabs.along(axis, center) <= after;
     let (left_count, centers) = move_to_front(items, cluster, is_left);
     Some(Halves { left_count, cost, centers: centers.map(|centers| centers.aabb()) })
 }
@@ -220,9 +220,21 @@ impl Slabs {
 
     #[inline]
     fn of(&self, p: Vec3A) -> [usize; 3] {
-        let at = (p - self.min) * self.per_metre;
-        at.to_array().map(|slab| (slab as usize).min(BINS - 1))
+        ((p - self.min) * self.per_metre).to_array().map(whole)
     }
+
+    /// The same along one axis.
+    #[inline]
+    fn along(&self, axis: usize, p: Vec3A) -> usize {
+        whole((p[axis] - self.min[axis]) * self.per_metre[axis])
+    }
+}
+
+/// A slab's number, from where in the slabs a point is.
+#[inline]
+fn whole(slab: f32) -> usize {
+    // By way of `i32`, which is one instruction.
+    (slab as i32 as usize).min(BINS - 1)
 }
 
 /// Brings the items whose centres fulfil a condition to the front and counts them; both parts keep
