@@ -45,14 +45,22 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let output = arguments.output.clone().unwrap_or(arguments.scene.with_extension("ltree"));
     let mut out = std::io::stdout().lock();
 
-    let started = Instant::now();
-    let mut scene = pipeline::load_scene(&arguments.scene)?;
+    let load = || {
+        let started = Instant::now();
+        pipeline::load_scene(&arguments.scene).map(|scene| (scene, started.elapsed()))
+    };
+    // While the scene is read, the output as it is and the base are verified.
+    let open = || {
+        let before = if arguments.force { None } else { Base::open(&output).ok() };
+        (before, arguments.base.as_deref().map(Base::open))
+    };
+    let (loaded, (before, base)) = rayon::join(load, open);
+    let (mut scene, loading) = loaded?;
     pipeline::force_lights(&mut scene, &arguments.force_light)
         .with_context(|| arguments.scene.display().to_string())?;
     for note in &scene.notes {
         eprintln!("note: {note}");
     }
-    let loaded = started.elapsed();
     let real = |path: &Path| path.canonicalize().ok();
     if scene.files.iter().any(|input| real(input).is_some() && real(input) == real(&output)) {
         bail!("{}: is the scene's own file; choose another output", output.display());
@@ -75,23 +83,19 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         survey.lights.len(),
         emitters.len(),
         emitters.changing_count(),
-        Seconds(loaded),
+        Seconds(loading),
     )?;
-    // The output as it is: up to date, or what the new one is built upon.
-    let before = if arguments.force { None } else { Base::open(&output).ok() };
     if before.as_ref().is_some_and(|before| pipeline::is_built_from(&before.tree, &survey)) {
         writeln!(out, "{}: up to date", output.display())?;
         return Ok(());
     }
-    let base = match &arguments.base {
+    let base = match base {
         None => before,
-        Some(path) => match Base::open(path) {
-            Ok(base) => Some(base),
-            Err(error) => {
-                eprintln!("note: not built upon {error}");
-                None
-            }
-        },
+        Some(Ok(base)) => Some(base),
+        Some(Err(error)) => {
+            eprintln!("note: not built upon {error}");
+            None
+        }
     };
     let mut times = Times::default();
     let bytes = build(&survey, base, &mut times, &mut out)?;
