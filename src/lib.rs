@@ -40,7 +40,7 @@
 //!
 //! // What the tree depends on, and the bytes of its file.
 //! let survey = pipeline::survey(&scene, &emitters, &pipeline::frames_of(&scene))?;
-//! let bytes = pipeline::build_tree(&survey, &pipeline::BuildOptions::default());
+//! let bytes = pipeline::build_tree(&survey);
 //!
 //! // The same type over bytes just built and over a mapped file (`pipeline::open_tree`).
 //! let tree = LightTree::open(bytes)?;

@@ -1,7 +1,7 @@
 //! Folders of shots, compared shot by shot.
 
-use super::side::is_tree_file;
 use super::{Diff, DiffOptions, Side, SideError, compare};
+use crate::pipeline::is_tree_file;
 use rayon::prelude::*;
 use serde::Serialize;
 use std::collections::BTreeMap;

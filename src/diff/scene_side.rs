@@ -10,7 +10,7 @@ use crate::emitter::{
     Emitters, InfiniteLight, LightOverflow, LightSource, PosedEmitters, infinite_lights,
 };
 use crate::light_tree::LightTree;
-use crate::pipeline::{self, BuildOptions, Survey};
+use crate::pipeline::{self, Survey};
 use crate::scene::{LightKind, Pose, Scene};
 use crate::store::AlignedBytes;
 use glam::Vec3;
@@ -61,7 +61,7 @@ impl<'a> SceneSide<'a> {
 
     /// The tree of the first frame.
     pub fn build(&self) -> LightTree<AlignedBytes> {
-        let bytes = pipeline::build_tree(&self.survey, &BuildOptions::default());
+        let bytes = pipeline::build_tree(&self.survey);
         LightTree::open(bytes).expect("what was just built can be opened")
     }
 

@@ -63,7 +63,7 @@ impl Side {
     /// # Errors
     /// If it cannot be read or is not sound.
     pub fn open(path: &Path) -> Result<Side, SideError> {
-        if is_tree_file(path) {
+        if pipeline::is_tree_file(path) {
             return Ok(Side::of_tree(path, pipeline::open_tree(path, true)?));
         }
         let scene = pipeline::load_scene(path)?;
@@ -101,11 +101,6 @@ impl Side {
             Content::Scene(_) => None,
         }
     }
-}
-
-/// Whether a path is that of a tree file.
-pub(super) fn is_tree_file(path: &Path) -> bool {
-    path.extension().is_some_and(|e| e.eq_ignore_ascii_case("ltree"))
 }
 
 /// A version whose lights are known.

@@ -12,13 +12,6 @@ use glam::Vec3;
 use std::borrow::Cow;
 use std::collections::HashMap;
 
-/// What a build is told besides the scene.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct BuildOptions {
-    /// The program and its version, for the file's `META`.
-    pub program: String,
-}
-
 /// A file, built upon an earlier one.
 pub struct Rebuilt {
     /// Its bytes: those that [`build_tree`] gives.
@@ -32,29 +25,20 @@ pub struct Rebuilt {
 /// Builds the trees: one in its own space for each light that is shared, carried along or forced; one
 /// over what stands still; and one a frame over that tree and what changes. The same survey gives the
 /// same bytes.
-pub fn build_tree(survey: &Survey, options: &BuildOptions) -> AlignedBytes {
+pub fn build_tree(survey: &Survey) -> AlignedBytes {
     let lights = LightList::new(&survey.lights);
-    write(survey, &lights, options, LightTreeWriter::default()).bytes
+    write(survey, &lights, LightTreeWriter::default()).bytes
 }
 
 /// The same, in less time: copies every subtree of an earlier file whose lights have not changed. The
 /// base must come from [`open_base`](super::open_base).
-pub fn rebuild_tree<D: AsRef<[u8]>>(
-    survey: &Survey,
-    options: &BuildOptions,
-    base: &LightTree<D>,
-) -> Rebuilt {
+pub fn rebuild_tree<D: AsRef<[u8]>>(survey: &Survey, base: &LightTree<D>) -> Rebuilt {
     let lights = LightList::new(&survey.lights);
     let writer = LightTreeWriter::upon(Base::new(base, &lights));
-    write(survey, &lights, options, writer)
+    write(survey, &lights, writer)
 }
 
-fn write(
-    survey: &Survey,
-    lights: &LightList,
-    options: &BuildOptions,
-    writer: LightTreeWriter,
-) -> Rebuilt {
+fn write(survey: &Survey, lights: &LightList, writer: LightTreeWriter) -> Rebuilt {
     let mut builder = Builder { writer, shared: Vec::new() };
     builder.share(survey);
     let links = builder.links(&survey.still, None);
@@ -72,7 +56,7 @@ fn write(
     }
     let writer = builder.writer;
     let meta = serde_json::json!({
-        "program": options.program,
+        "program": concat!("candelabra ", env!("CARGO_PKG_VERSION")),
         ALGORITHM: ALGORITHM_VERSION,
     });
     let (leaves, reused) = (writer.leaf_count(), writer.reused_leaf_count());

@@ -52,6 +52,11 @@ pub enum TreeError {
     Overflow(#[from] LightOverflow),
 }
 
+/// Whether a path is that of a tree file, by its extension.
+pub fn is_tree_file(path: &Path) -> bool {
+    path.extension().is_some_and(|e| e.eq_ignore_ascii_case("ltree"))
+}
+
 /// Maps and opens a tree file; with `verify`, proves that it keeps the format's promises.
 ///
 /// # Errors

@@ -13,12 +13,14 @@ mod fresh;
 mod look;
 mod survey;
 
-pub use build::{BuildOptions, Rebuilt, build_tree, rebuild_tree};
+pub use build::{Rebuilt, build_tree, rebuild_tree};
 pub use camera::{NoCamera, find_camera};
 pub use content::scene_fingerprint;
 pub use forced::{NoLightThere, force_lights};
 pub use frames::frames_of;
-pub use fresh::{OpenedTree, StaleTree, TreeError, check_fresh, open_base, open_tree};
+pub use fresh::{
+    OpenedTree, StaleTree, TreeError, check_fresh, is_tree_file, open_base, open_tree,
+};
 pub use look::is_built_from;
 pub use survey::{Group, PlacedLight, SharedBounds, Survey, survey};
 

@@ -5,7 +5,7 @@
 mod lights;
 
 use candelabra::emitter::Emitters;
-use candelabra::pipeline::{self, BuildOptions, Survey};
+use candelabra::pipeline::{self, Survey};
 use candelabra::scene::Scene;
 use candelabra::store::write_atomically;
 use std::hint::black_box;
@@ -39,12 +39,11 @@ fn survey(scene: &Scene) -> Survey {
 
 /// One line of the table: point lights, each a prim of its own.
 fn row(folder: &std::path::Path, count: u32) -> String {
-    let options = BuildOptions::default();
     let mut scene = lights::points(count);
     let before = survey(&scene);
     let surveying = seconds(|| survey(&scene));
-    let building = seconds(|| pipeline::build_tree(&before, &options));
-    let bytes = pipeline::build_tree(&before, &options);
+    let building = seconds(|| pipeline::build_tree(&before));
+    let bytes = pipeline::build_tree(&before);
     let path = folder.join("points.ltree");
     let writing =
         seconds(|| write_atomically(&path, |file| file.write_all(bytes.as_ref())).unwrap());
@@ -54,9 +53,9 @@ fn row(folder: &std::path::Path, count: u32) -> String {
     let after = survey(&scene);
     let verifying = seconds(|| pipeline::open_base(&path).unwrap());
     let base = pipeline::open_base(&path).unwrap();
-    let rebuilding = seconds(|| pipeline::rebuild_tree(&after, &options, &base));
-    let rebuilt = pipeline::rebuild_tree(&after, &options, &base);
-    let full = pipeline::build_tree(&after, &options);
+    let rebuilding = seconds(|| pipeline::rebuild_tree(&after, &base));
+    let rebuilt = pipeline::rebuild_tree(&after, &base);
+    let full = pipeline::build_tree(&after);
     assert!(full.as_ref() == rebuilt.bytes.as_ref(), "the same bytes");
 
     let pays = ((building + writing) / (building - opening)).ceil().max(1.0);

@@ -11,7 +11,7 @@ use candelabra::light_tree::{
     TreeKind,
 };
 use candelabra::math::random::{hash, widen};
-use candelabra::pipeline::{self, BuildOptions, open_tree};
+use candelabra::pipeline::{self, open_tree};
 use candelabra::scene::Scene;
 use candelabra::store::AlignedBytes;
 use criterion::{Criterion, criterion_group};
@@ -129,18 +129,17 @@ fn one_changed(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("a hundred thousand lights, one changed");
     group.sample_size(20);
     let survey = |scene: &Scene| pipeline::survey(scene, &Emitters::collect(scene), &[1]).unwrap();
-    let options = BuildOptions::default();
     let mut scene = lights::points(100_000);
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("before.ltree");
-    std::fs::write(&path, pipeline::build_tree(&survey(&scene), &options).as_ref()).unwrap();
+    std::fs::write(&path, pipeline::build_tree(&survey(&scene)).as_ref()).unwrap();
     lights::change_one(&mut scene);
     let after = survey(&scene);
-    group.bench_function("build", |b| b.iter(|| pipeline::build_tree(&after, &options)));
+    group.bench_function("build", |b| b.iter(|| pipeline::build_tree(&after)));
     group.bench_function("verify the base and build upon it", |b| {
         b.iter(|| {
             let base = pipeline::open_base(&path).unwrap();
-            pipeline::rebuild_tree(&after, &options, &base)
+            pipeline::rebuild_tree(&after, &base)
         });
     });
     group.finish();

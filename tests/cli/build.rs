@@ -10,7 +10,7 @@ fn a_scene_becomes_a_tree_beside_it() {
     let shot = Shot::still();
     shot.candelabra(&format!("build {SCENE}"))
         .ends(0)
-        .says("1 lights, 2 emitters (0 change)")
+        .says("1 light, 2 emitters (0 change)")
         .says("shot.ltree");
     assert_eq!(shot.names(), [SCENE, "shot.ltree"], "no temporary files are left");
     shot.candelabra("inspect shot.ltree").ends(0).says("sound").says("/lamp");

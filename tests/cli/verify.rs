@@ -8,7 +8,7 @@ fn it_says_of_each_file_what_it_is() {
     shot.candelabra(&format!("build {SCENE}")).ends(0);
     shot.candelabra("verify shot.ltree")
         .ends(0)
-        .says("shot.ltree: sound: 1 lights, 2 emitters, 1 trees");
+        .says("shot.ltree: sound: 1 light, 2 emitters, 1 tree, ");
     let mut bytes = shot.read("shot.ltree");
     bytes[64] ^= 1;
     shot.write("table.ltree", &bytes);

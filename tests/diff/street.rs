@@ -2,7 +2,7 @@
 
 use candelabra::diff::{Change, Diff, DiffOptions, Difference, Side, Verb, compare};
 use candelabra::emitter::Emitters;
-use candelabra::pipeline::{self, BuildOptions};
+use candelabra::pipeline;
 use candelabra::scene::{
     Camera, Instance, Light, LightKind, Material, Mesh, Node, Scene, Shaping, Trs,
 };
@@ -128,7 +128,7 @@ pub fn tree_of(scene: &Scene, folder: &TempDir, name: &str) -> Side {
     let emitters = Emitters::collect(scene);
     let survey = pipeline::survey(scene, &emitters, &pipeline::frames_of(scene)).unwrap();
     let path = folder.path().join(name);
-    std::fs::write(&path, pipeline::build_tree(&survey, &BuildOptions::default())).unwrap();
+    std::fs::write(&path, pipeline::build_tree(&survey)).unwrap();
     Side::open(Path::new(&path)).unwrap()
 }
 

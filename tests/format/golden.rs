@@ -13,7 +13,7 @@
 use crate::page::{Report, report};
 use candelabra::emitter::Emitters;
 use candelabra::light_tree::{FrameTree, Pick, Receiver};
-use candelabra::pipeline::{self, BuildOptions, OpenedTree};
+use candelabra::pipeline::{self, OpenedTree};
 use candelabra::store::AlignedBytes;
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
@@ -39,7 +39,7 @@ fn built() -> AlignedBytes {
     let scene = pipeline::load_scene(&path("golden.gltf")).unwrap();
     let emitters = Emitters::collect(&scene);
     let survey = pipeline::survey(&scene, &emitters, &pipeline::frames_of(&scene)).unwrap();
-    pipeline::build_tree(&survey, &BuildOptions { program: "golden".into() })
+    pipeline::build_tree(&survey)
 }
 
 /// What was recorded of the file: its content, and what sampling it gave.

@@ -2,7 +2,7 @@
 
 use candelabra::emitter::Emitters;
 use candelabra::light_tree::{LightTree, TreeKind};
-use candelabra::pipeline::{self, BuildOptions, Rebuilt};
+use candelabra::pipeline::{self, Rebuilt};
 use candelabra::scene::{
     Channel, Instance, Keys, Light, LightKind, Material, Mesh, Node, Scene, Shaping, Trs,
 };
@@ -163,12 +163,12 @@ type File = LightTree<AlignedBytes>;
 
 fn full(scene: &Scene) -> File {
     let survey = pipeline::survey(scene, &Emitters::collect(scene), &FRAMES).unwrap();
-    LightTree::open(pipeline::build_tree(&survey, &BuildOptions::default())).unwrap()
+    LightTree::open(pipeline::build_tree(&survey)).unwrap()
 }
 
 fn upon(base: &File, scene: &Scene) -> Rebuilt {
     let survey = pipeline::survey(scene, &Emitters::collect(scene), &FRAMES).unwrap();
-    pipeline::rebuild_tree(&survey, &BuildOptions::default(), base)
+    pipeline::rebuild_tree(&survey, base)
 }
 
 fn is_same(file: File, rebuilt: &Rebuilt) -> bool {

@@ -5,7 +5,7 @@ use crate::support::dead_probability_in;
 use candelabra::emitter::{Emitters, infinite_lights};
 use candelabra::light_tree::{LightTree, Receiver};
 use candelabra::math::random::hash;
-use candelabra::pipeline::{self, BuildOptions};
+use candelabra::pipeline;
 use candelabra::scene::{Light, LightKind, Node, Scene, Trs};
 use glam::{DMat3, DQuat, DVec3, Vec2, Vec3};
 use std::path::PathBuf;
@@ -108,7 +108,7 @@ fn triangles_without_area_leave_the_light_to_those_with_one() {
     let scene = pipeline::load_scene(&path).unwrap();
     let emitters = Emitters::collect(&scene);
     let survey = pipeline::survey(&scene, &emitters, &[]).unwrap();
-    let tree = LightTree::open(pipeline::build_tree(&survey, &BuildOptions::default())).unwrap();
+    let tree = LightTree::open(pipeline::build_tree(&survey)).unwrap();
     assert_eq!(tree.verify(), Ok(()));
     let table = tree.leaf_table();
     let frame = tree.at_frame(0, &table).unwrap();

@@ -2,7 +2,7 @@
 
 use candelabra::emitter::Emitters;
 use candelabra::light_tree::LightTree;
-use candelabra::pipeline::{self, BuildOptions, StaleTree, TreeError};
+use candelabra::pipeline::{self, StaleTree, TreeError};
 use candelabra::scene::{
     Camera, Channel, Instance, Interpolation, Keys, Light, LightKind, Material, Medium, Mesh, Node,
     Pixels, Scene, Shaping, Texture, TextureUse, Trs, Wrap,
@@ -102,7 +102,7 @@ fn street() -> Scene {
 fn staleness(scene: &Scene) -> Option<StaleTree> {
     let street = street();
     let survey = pipeline::survey(&street, &Emitters::collect(&street), &[1, 2, 3]).unwrap();
-    let tree = LightTree::open(pipeline::build_tree(&survey, &BuildOptions::default())).unwrap();
+    let tree = LightTree::open(pipeline::build_tree(&survey)).unwrap();
     let emitters = Emitters::collect(scene);
     match pipeline::check_fresh(&tree, Path::new("street.ltree"), scene, &emitters, &[]) {
         Ok(()) => None,

@@ -5,7 +5,7 @@ use crate::stage::Set;
 use candelabra::bounds::Aabb;
 use candelabra::emitter::Emitters;
 use candelabra::light_tree::LightTree;
-use candelabra::pipeline::{self, BuildOptions};
+use candelabra::pipeline;
 use candelabra::render::{RenderDelegate, RenderSettings};
 use candelabra::scene::{Camera, Light, LightKind, Node, Scene, Trs};
 use glam::{DVec3, Vec3};
@@ -123,7 +123,7 @@ fn seventeen_million_emitters() {
     tell("emitters collected");
     let survey = pipeline::survey(&scene, &emitters, &[1]).unwrap();
     tell("surveyed");
-    let tree = LightTree::open(pipeline::build_tree(&survey, &BuildOptions::default())).unwrap();
+    let tree = LightTree::open(pipeline::build_tree(&survey)).unwrap();
     tell("built");
     tree.verify().unwrap();
     tell("verified");

@@ -5,7 +5,7 @@
 
 use candelabra::emitter::Emitters;
 use candelabra::light_tree::LightTree;
-use candelabra::pipeline::{self, BuildOptions};
+use candelabra::pipeline;
 use candelabra::render::buffers::RenderBuffers;
 use candelabra::render::{LightStrategy, RenderDelegate, RenderSettings};
 use candelabra::scene::{
@@ -203,7 +203,7 @@ impl<'a> Set<'a> {
 /// The tree file of a scene.
 pub fn tree_bytes(scene: &Scene, frames: &[i32]) -> AlignedBytes {
     let survey = pipeline::survey(scene, &Emitters::collect(scene), frames).unwrap();
-    pipeline::build_tree(&survey, &BuildOptions::default())
+    pipeline::build_tree(&survey)
 }
 
 fn quad([width, height]: [f32; 2]) -> Mesh {

@@ -5,7 +5,7 @@ use crate::progress::Bar;
 use anyhow::{Context, Result, bail};
 use candelabra::emitter::Emitters;
 use candelabra::light_tree::{ALGORITHM_VERSION, LightTree};
-use candelabra::pipeline::{self, BuildOptions};
+use candelabra::pipeline;
 use candelabra::render::exr::{ExrOptions, read_metadata, write_exr};
 use candelabra::render::frames::Frames;
 use candelabra::render::png::{exposure_for, write_png};
@@ -48,7 +48,7 @@ pub fn render(arguments: &Arguments) -> Result<usize> {
             let mut ascending = frames.as_slice().to_vec();
             ascending.sort_unstable();
             let survey = pipeline::survey(&scene, &emitters, &ascending)?;
-            let bytes = pipeline::build_tree(&survey, &BuildOptions::default());
+            let bytes = pipeline::build_tree(&survey);
             let tree = LightTree::open(bytes)?;
             render_frames(arguments, &scene, &emitters, &tree, camera, &frames)
         }

@@ -3,7 +3,8 @@
 use anyhow::{Context, Result, bail};
 use candelabra::emitter::Emitters;
 use candelabra::light_tree::LightTree;
-use candelabra::pipeline::{self, BuildOptions, OpenedTree, Rebuilt, Survey, TreeError};
+use candelabra::page::counted;
+use candelabra::pipeline::{self, OpenedTree, Rebuilt, Survey, TreeError};
 use candelabra::render::frames::Frames;
 use candelabra::store::{AlignedBytes, write_atomically};
 use clap::Args;
@@ -78,10 +79,10 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         .with_context(|| arguments.scene.display().to_string())?;
     writeln!(
         out,
-        "{}: {} lights, {} emitters ({} change), read in {}",
+        "{}: {}, {} ({} change), read in {}",
         arguments.scene.display(),
-        survey.lights.len(),
-        emitters.len(),
+        counted(survey.lights.len(), "light"),
+        counted(emitters.len(), "emitter"),
         emitters.changing_count(),
         Seconds(loading),
     )?;
@@ -137,15 +138,13 @@ fn build(
     times: &mut Times,
     out: &mut impl Write,
 ) -> Result<AlignedBytes> {
-    let options =
-        BuildOptions { program: concat!("candelabra ", env!("CARGO_PKG_VERSION")).into() };
     let started = Instant::now();
     let Some(Base { path, tree, opening }) = base else {
-        let bytes = pipeline::build_tree(survey, &options);
+        let bytes = pipeline::build_tree(survey);
         times.building = started.elapsed();
         return Ok(bytes);
     };
-    let rebuilt = pipeline::rebuild_tree(survey, &options, &tree);
+    let rebuilt = pipeline::rebuild_tree(survey, &tree);
     times.building = started.elapsed();
     let Rebuilt { bytes, reused, leaves } = rebuilt;
     writeln!(

@@ -5,8 +5,8 @@ use anyhow::{Context, Result};
 use candelabra::emitter::Emitters;
 use candelabra::inspect::{self, SceneReport, TreeReport};
 use candelabra::light_tree::LightTree;
-use candelabra::page::Short;
-use candelabra::pipeline::{self, BuildOptions};
+use candelabra::page::{Short, counted};
+use candelabra::pipeline;
 use clap::Args;
 use serde::Serialize;
 use std::io::Write;
@@ -34,7 +34,7 @@ pub struct Arguments {
 }
 
 pub fn run(arguments: &Arguments) -> Result<()> {
-    if arguments.file.extension().is_some_and(|e| e.eq_ignore_ascii_case("ltree")) {
+    if pipeline::is_tree_file(&arguments.file) {
         let tree = pipeline::open_tree(&arguments.file, true)?;
         show_tree(arguments, &tree, None)
     } else {
@@ -54,9 +54,7 @@ fn show_scene(arguments: &Arguments) -> Result<()> {
     }
     let survey = pipeline::survey(&scene, &emitters, &pipeline::frames_of(&scene))
         .with_context(|| arguments.file.display().to_string())?;
-    let options =
-        BuildOptions { program: concat!("candelabra ", env!("CARGO_PKG_VERSION")).into() };
-    let tree = LightTree::open(pipeline::build_tree(&survey, &options))?;
+    let tree = LightTree::open(pipeline::build_tree(&survey))?;
     show_tree(arguments, &tree, Some(&report))
 }
 
@@ -122,14 +120,14 @@ fn print_tree(out: &mut impl Write, report: &TreeReport) -> Result<()> {
     }
     writeln!(
         out,
-        "  {} emitters of {} lights, {} lights change, {} are forced; {} trees, {} instances, {} frames",
-        report.emitters,
-        report.lights,
+        "  {} of {} ({} change, {} forced); {}, {}, {}",
+        counted(report.emitters, "emitter"),
+        counted(report.lights, "light"),
         report.changing,
         report.forced,
-        report.trees.iter().map(|shape| shape.trees).sum::<usize>(),
-        report.instances,
-        report.frames.map_or(0, |frames| frames.count)
+        counted(report.trees.iter().map(|shape| shape.trees).sum(), "tree"),
+        counted(report.instances, "instance"),
+        counted(report.frames.map_or(0, |frames| frames.count), "frame")
     )?;
     writeln!(
         out,

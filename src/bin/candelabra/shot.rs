@@ -3,7 +3,7 @@
 use anyhow::{Context, Result, anyhow};
 use candelabra::emitter::Emitters;
 use candelabra::light_tree::LightTree;
-use candelabra::pipeline::{self, BuildOptions};
+use candelabra::pipeline;
 use candelabra::scene::{Camera, Scene};
 use candelabra::store::AlignedBytes;
 use clap::Args;
@@ -38,7 +38,7 @@ impl Shot {
         let emitters = Emitters::collect(&scene);
         let frame = arguments.frame.unwrap_or_else(|| pipeline::frames_of(&scene)[0]);
         let survey = pipeline::survey(&scene, &emitters, &[frame]).with_context(name)?;
-        let bytes = pipeline::build_tree(&survey, &BuildOptions::default());
+        let bytes = pipeline::build_tree(&survey);
         let tree = LightTree::open(bytes).map_err(|error| anyhow!("{}: {error}", name()))?;
         Ok(Shot { scene, emitters, tree, camera, frame })
     }

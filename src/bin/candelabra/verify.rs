@@ -1,6 +1,7 @@
 //! `candelabra verify`: whether tree files are what the format says.
 
 use anyhow::Result;
+use candelabra::page::counted;
 use candelabra::pipeline::{self, OpenedTree, TreeError};
 use candelabra::store::StoreError;
 use clap::Args;
@@ -54,7 +55,11 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
 }
 
 fn summary(tree: &OpenedTree) -> String {
-    let (lights, emitters) = (tree.lights().len(), tree.emitter_count());
-    let (trees, bytes) = (tree.trees().len(), tree.byte_length());
-    format!("{lights} lights, {emitters} emitters, {trees} trees, {bytes} bytes")
+    let counts = [
+        (tree.lights().len(), "light"),
+        (tree.emitter_count(), "emitter"),
+        (tree.trees().len(), "tree"),
+        (tree.byte_length(), "byte"),
+    ];
+    counts.map(|(count, what)| counted(count, what)).join(", ")
 }

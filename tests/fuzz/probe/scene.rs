@@ -59,7 +59,7 @@ fn load(path: &Path) {
     }
     let frames: Vec<i32> = pipeline::frames_of(&scene).into_iter().take(3).collect();
     let Ok(survey) = pipeline::survey(&scene, &emitters, &frames) else { return };
-    let bytes = pipeline::build_tree(&survey, &pipeline::BuildOptions::default());
+    let bytes = pipeline::build_tree(&survey);
     let tree = LightTree::open(bytes).expect("a tree just built opens");
     tree.verify().expect("a tree just built is sound");
     assert_eq!(tree.emitter_count(), emitters.len());
