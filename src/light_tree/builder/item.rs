@@ -40,6 +40,17 @@ impl Item {
         }
     }
 
+    /// Whether two cannot be told apart by what is known here: so of all with the same bounds, and of
+    /// few others.
+    pub fn looks_like(&self, other: &Item) -> bool {
+        // Bit by bit: the order of bounds tells 0 from -0.
+        let bits = |item: &Item| {
+            let corners = [item.min, item.max].map(|corner| corner.to_array().map(f32::to_bits));
+            (corners, item.directed.to_array().map(f32::to_bits))
+        };
+        bits(self) == bits(other)
+    }
+
     #[inline]
     pub fn center(&self) -> Vec3A {
         0.5 * self.min + 0.5 * self.max

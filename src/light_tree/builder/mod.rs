@@ -55,7 +55,7 @@ pub(super) fn build_tree<'e>(
     let centers = saoh::center_box(&items);
     let reuse = earlier.map(|earlier| {
         out.reserve(earlier.groups.len());
-        Reuse::new(earlier, &items, bounds)
+        Reuse::new(earlier, &items)
     });
     let builder = Builder { bounds, items, link, reuse };
     let mut places: Vec<u32> = (0..bounds.len() as u32).collect();

@@ -16,18 +16,18 @@ pub fn canonical(bounds: &[LightBounds]) -> Vec<Item> {
     let mut keys: Vec<(u64, u32)> =
         (0..bounds.len() as u32).into_par_iter().map(|index| (place(index).0, index)).collect();
     keys.par_sort_unstable_by_key(|(coarse, _)| *coarse);
-    for run in keys.chunk_by_mut(|a, b| a.0 == b.0).filter(|run| run.len() > 1) {
-        run.par_sort_unstable_by(|&(_, a), &(_, b)| {
-            let by_place = place(a).1.cmp(&place(b).1);
-            by_place.then_with(|| total_order(of(a), of(b))).then(a.cmp(&b))
-        });
-    }
+    let by_all = |&(_, a): &(u64, u32), &(_, b): &(u64, u32)| {
+        let by_place = place(a).1.cmp(&place(b).1);
+        by_place.then_with(|| total_order(of(a), of(b))).then(a.cmp(&b))
+    };
+    let runs = keys.par_chunk_by_mut(|a, b| a.0 == b.0).filter(|run| run.len() > 1);
+    runs.for_each(|run| run.par_sort_unstable_by(by_all));
     keys.par_iter().map(|&(_, index)| Item::new(of(index), index)).collect()
 }
 
 /// A total order over every number of the bounds. Equal bounds may swap: nobody can tell, but by the
 /// numbers of their emitters, which ascend.
-pub fn total_order(a: &LightBounds, b: &LightBounds) -> Ordering {
+fn total_order(a: &LightBounds, b: &LightBounds) -> Ordering {
     let numbers = |bounds: &LightBounds| {
         let LightBounds { aabb, cone, energy, range_m } = *bounds;
         let vectors = [aabb.min, aabb.max, cone.axis].map(|v| v.to_array());

@@ -6,8 +6,6 @@
 
 use super::DEEPEST_BY_COST;
 use super::item::Item;
-use super::order::total_order;
-use crate::bounds::LightBounds;
 use crate::light_tree::group::{Group, WIDTH};
 use crate::light_tree::node::Link;
 use rayon::prelude::*;
@@ -48,12 +46,12 @@ struct Subtree {
 }
 
 impl<'a> Reuse<'a> {
-    pub fn new(earlier: Earlier<'a>, items: &[Item], bounds: &[LightBounds]) -> Reuse<'a> {
+    pub fn new(earlier: Earlier<'a>, items: &[Item]) -> Reuse<'a> {
         let Earlier { groups, slots } = earlier;
         let slot = |item: &Item| slots[item.index as usize];
         let ((subtrees, height), mut slots) =
             rayon::join(|| measure(groups), || items.par_iter().map(slot).collect::<Vec<u32>>());
-        forget_swapped(&mut slots, groups, items, bounds);
+        forget_swapped(&mut slots, groups, items);
         let mut inputs = vec![CHANGED; groups.len() * WIDTH];
         for (&slot, item) in slots.iter().zip(items).filter(|(slot, _)| **slot != CHANGED) {
             inputs[slot as usize] = item.index;
@@ -138,18 +136,14 @@ fn measure(groups: &[Group]) -> (Vec<Subtree>, usize) {
 
 /// Items with the same bounds follow each other by their numbers. Where they followed each other
 /// otherwise in the earlier tree, a build would swap them: then none of them counts as unchanged.
-fn forget_swapped(slots: &mut [u32], groups: &[Group], items: &[Item], bounds: &[LightBounds]) {
-    if !items.par_windows(2).any(|pair| pair[0].min == pair[1].min) {
-        return;
-    }
-    let of = |item: &Item| &bounds[item.index as usize];
+fn forget_swapped(slots: &mut [u32], groups: &[Group], items: &[Item]) {
     let old = |slot: u32| groups[slot as usize / WIDTH].link(slot as usize % WIDTH);
-    let mut first = 0;
-    for run in items.chunk_by(|a, b| a.min == b.min && total_order(of(a), of(b)).is_eq()) {
-        let slots = &mut slots[first..first + run.len()];
-        first += run.len();
+    let is_twin = |at: &usize| items[at - 1].looks_like(&items[*at]);
+    let twins: Vec<usize> = (1..items.len()).into_par_iter().filter(is_twin).collect();
+    for run in twins.chunk_by(|a, b| a + 1 == *b) {
+        let slots = &mut slots[run[0] - 1..run[0] + run.len()];
         let known = slots.iter().copied().filter(|&slot| slot != CHANGED);
-        if run.len() > 1 && !known.is_sorted_by(|&a, &b| old(a) < old(b)) {
+        if !known.is_sorted_by(|&a, &b| old(a) < old(b)) {
             slots.fill(CHANGED);
         }
     }
