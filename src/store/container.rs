@@ -79,17 +79,12 @@ pub struct ContainerWriter<'a> {
 
 impl<'a> ContainerWriter<'a> {
     /// Adds a section. Sections keep the order in which they are added.
-    pub fn section<T: Pod + Send + Sync>(
-        &mut self,
-        id: SectionId,
-        required: bool,
-        elements: &'a [T],
-    ) {
-        let copy = |place: &mut [T]| {
-            let places = place.par_chunks_mut(CHUNK);
-            places.zip(elements.par_chunks(CHUNK)).for_each(|(to, from)| to.copy_from_slice(from));
-        };
-        self.section_with(id, required, elements.len(), copy);
+    pub fn section<T: Pod>(&mut self, id: SectionId, required: bool, elements: &'a [T]) {
+        let bytes: &[u8] = bytemuck::cast_slice(elements);
+        self.add::<T>(id, required, elements.len(), move |place| {
+            let places = place.par_chunks_mut(CHUNK).zip(bytes.par_chunks(CHUNK));
+            places.for_each(|(to, from)| to.copy_from_slice(from));
+        });
     }
 
     /// Adds a section whose elements, zero at first, are written in place when the file is.
@@ -100,6 +95,16 @@ impl<'a> ContainerWriter<'a> {
         count: usize,
         fill: impl FnOnce(&mut [T]) + Send + 'a,
     ) {
+        self.add::<T>(id, required, count, |place| fill(bytemuck::cast_slice_mut(place)));
+    }
+
+    fn add<T>(
+        &mut self,
+        id: SectionId,
+        required: bool,
+        count: usize,
+        fill: impl FnOnce(&mut [u8]) + Send + 'a,
+    ) {
         let row = Section {
             id,
             required: required.into(),
@@ -108,7 +113,6 @@ impl<'a> ContainerWriter<'a> {
             element_size: size_of::<T>() as u32,
             checksum: 0,
         };
-        let fill = |bytes: &mut [u8]| fill(bytemuck::cast_slice_mut(bytes));
         self.sections.push((row, Box::new(fill)));
     }
 
@@ -156,8 +160,8 @@ impl<'a> ContainerWriter<'a> {
     }
 }
 
-/// What one task copies, in elements, or sums, in bytes.
-const CHUNK: usize = 1 << 16;
+/// Bytes that one task copies or sums.
+const CHUNK: usize = 1 << 18;
 
 /// CRC-32, chunk by chunk, side by side.
 fn checksum_of(bytes: &[u8]) -> u32 {
