@@ -52,11 +52,9 @@ pub(super) fn build_tree<'e>(
         return None;
     }
     let (items, earlier) = rayon::join(|| order::canonical(bounds), earlier);
-    let centers = saoh::center_box(&items);
-    let reuse = earlier.map(|earlier| {
-        out.reserve(earlier.groups.len());
-        Reuse::new(earlier, &items)
-    });
+    out.reserve(earlier.as_ref().map_or(0, |earlier| earlier.groups.len()));
+    let reuse = || earlier.map(|earlier| Reuse::new(earlier, &items));
+    let (centers, reuse) = rayon::join(|| saoh::center_box(&items), reuse);
     let builder = Builder { bounds, items, link, reuse };
     let mut places: Vec<u32> = (0..bounds.len() as u32).collect();
     let all = Cluster { places: &mut places, centers, cost: f64::INFINITY };
@@ -82,6 +80,13 @@ impl Cluster<'_> {
     }
 }
 
+/// The groups of a part of a cluster.
+struct Below {
+    /// The first of them.
+    first: usize,
+    bounds: LightBounds,
+}
+
 /// What is the same for all clusters.
 struct Builder<'a, L> {
     bounds: &'a [LightBounds],
@@ -105,35 +110,62 @@ impl<L: Fn(usize) -> Link + Sync> Builder<'_, L> {
         out.push(Group::zeroed());
         let go_parallel = cluster.places.len() > PARALLEL_ABOVE;
         let mut parts = self.divide(cluster, depth);
-        let build_apart = |part: &mut Cluster| {
-            let mut groups = Vec::new();
-            let is_one = part.places.len() == 1;
-            let bounds = (!is_one).then(|| self.build_cluster(part.take(), depth + 1, &mut groups));
-            (bounds, groups)
+        let below = if go_parallel {
+            self.build_side_by_side(&mut parts, depth + 1, out)
+        } else {
+            parts.iter_mut().map(|part| self.build_below(part, depth + 1, out)).collect()
         };
-        let mut apart: Vec<_> =
-            if go_parallel { parts.par_iter_mut().map(build_apart).collect() } else { Vec::new() };
-        let mut nodes = Vec::with_capacity(WIDTH);
-        for (lane, part) in parts.into_iter().enumerate() {
-            if let [place] = *part.places {
-                let index = self.items[place as usize].index as usize;
-                nodes.push(Node::encode(&self.bounds[index], (self.link)(index)));
-                continue;
-            }
-            let first = out.len();
-            let bounds = match apart.get_mut(lane).map(std::mem::take) {
-                Some((Some(bounds), mut groups)) => {
-                    out.append(&mut groups);
-                    bounds
+        for (lane, (part, below)) in parts.iter().zip(below).enumerate() {
+            let node = match below {
+                Some(Below { first, bounds }) => {
+                    Node::encode(&bounds, Link::Inner((first - own) as u32))
                 }
-                _ => self.build_cluster(part, depth + 1, out),
+                None => {
+                    let index = self.items[part.places[0] as usize].index as usize;
+                    Node::encode(&self.bounds[index], (self.link)(index))
+                }
             };
-            nodes.push(Node::encode(&bounds, Link::Inner((first - own) as u32)));
-        }
-        for (lane, node) in nodes.iter().enumerate() {
-            out[own].set(lane, node);
+            out[own].set(lane, &node);
         }
         bounds_of_lanes(&out[own])
+    }
+
+    /// The groups of a part of a cluster; `None` if it is but one item.
+    fn build_below(&self, part: &mut Cluster, depth: usize, out: &mut Vec<Group>) -> Option<Below> {
+        (part.places.len() > 1).then(|| {
+            let first = out.len();
+            Below { first, bounds: self.build_cluster(part.take(), depth, out) }
+        })
+    }
+
+    /// The same of all parts, each by a task.
+    fn build_side_by_side(
+        &self,
+        parts: &mut [Cluster],
+        depth: usize,
+        out: &mut Vec<Group>,
+    ) -> Vec<Option<Below>> {
+        let build = |part: &mut Cluster| {
+            let mut groups = Vec::new();
+            (self.build_below(part, depth, &mut groups), groups)
+        };
+        let (mut below, apart): (Vec<_>, Vec<_>) = parts.par_iter_mut().map(build).unzip();
+        // Behind the last group of each part, counted from the first of all.
+        let mut ends = Vec::with_capacity(WIDTH);
+        let mut end = 0;
+        for (below, groups) in below.iter_mut().zip(&apart) {
+            if let Some(below) = below {
+                below.first = out.len() + end;
+            }
+            end += groups.len();
+            ends.push(end);
+        }
+        let group = |at: usize| {
+            let part = ends.partition_point(|&end| end <= at);
+            apart[part][at + apart[part].len() - ends[part]]
+        };
+        out.par_extend((0..end).into_par_iter().map(group));
+        below
     }
 
     /// Cuts a cluster into up to eight parts: the costliest first of those that fill a group of their
