@@ -1,7 +1,6 @@
 //! Bytes in memory with the alignment of a mapped file.
 
 use bytemuck::{Pod, Zeroable};
-use rayon::prelude::*;
 
 /// Sections start at multiples of this, so that any plain-old-data type can be viewed in place and
 /// no node straddles two cache lines.
@@ -21,9 +20,7 @@ pub struct AlignedBytes {
 impl AlignedBytes {
     /// A zeroed buffer of `length` bytes.
     pub fn zeroed(length: usize) -> AlignedBytes {
-        // Side by side, as memory that is touched for the first time is slow.
-        let blocks = (0..length.div_ceil(ALIGNMENT)).into_par_iter().map(|_| Block::zeroed());
-        AlignedBytes { blocks: blocks.collect(), length }
+        AlignedBytes { blocks: bytemuck::zeroed_vec(length.div_ceil(ALIGNMENT)), length }
     }
 
     /// A copy of some bytes.
