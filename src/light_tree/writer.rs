@@ -44,12 +44,14 @@ impl<'a> LightList<'a> {
         let size = |light: &LightSummary| (light.emitter_count, light.path.len() as u32);
         // Summaries are large: they are read side by side, then summed one by one.
         let mut starts: Vec<_> = lights.par_iter().map(size).collect();
-        let mut next = (0, 0);
+        let (mut next_emitter, mut path_length) = (0, 0_usize);
         for start in &mut starts {
-            let (emitters, length) = std::mem::replace(start, next);
-            next = (next.0 + emitters, next.1 + length);
+            // Paths of 4 GiB in all would wrap here: such a file is refused before it is written.
+            let (emitters, length) = std::mem::replace(start, (next_emitter, path_length as u32));
+            next_emitter += emitters;
+            path_length += length as usize;
         }
-        LightList { lights, starts, path_length: next.1 as usize }
+        LightList { lights, starts, path_length }
     }
 
     /// A row of the section of lights.
