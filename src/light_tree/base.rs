@@ -23,6 +23,8 @@ pub struct Base<'a> {
     list: &'a LightList<'a>,
     /// For each of them the first emitter of the light of the base that it equals.
     old_firsts: Vec<Option<u32>>,
+    /// Whether those follow each other as they did.
+    in_order: bool,
     /// The first emitters of lights that are placed, and the rows of their trees; both ascending.
     placed: Vec<(u32, u32)>,
 }
@@ -37,7 +39,9 @@ impl<'a> Base<'a> {
         let mut placed: Vec<_> = placed.filter(is_shared).collect();
         placed.sort_unstable();
         placed.dedup();
-        Base { list, old_firsts: same_lights(&tree, list.lights), placed, tree }
+        let old_firsts = same_lights(&tree, list.lights);
+        let in_order = old_firsts.iter().flatten().is_sorted();
+        Base { list, old_firsts, in_order, placed, tree }
     }
 
     /// The `nth` tree of its own that a light has, if the light has not changed.
@@ -123,7 +127,7 @@ impl<'a> Base<'a> {
                 *entry = found.map_or(CHANGED, |slot| slot - first);
             }
         });
-        Earlier { groups: self.tree.groups_of(row), slots }
+        Earlier { groups: self.tree.groups_of(row), slots, in_order: self.in_order }
     }
 
     /// The place of the light that a leaf belongs to, if it belongs to one.

@@ -9,6 +9,7 @@ use super::importance::{Cluster, Sight, importance};
 use super::node::{self, Link, Node};
 use super::viewer::Viewer;
 use super::wide;
+use crate::bounds::LightBounds;
 use bytemuck::{Pod, Zeroable};
 
 /// Children of a cluster.
@@ -67,6 +68,15 @@ impl Group {
         (0..WIDTH).filter_map(|lane| self.node(lane))
     }
 
+    /// The bounds of all lanes together: of what the nodes say, which is rounded outwards.
+    ///
+    /// # Panics
+    /// If no lane is used.
+    pub(super) fn bounds(&self) -> LightBounds {
+        let rounded: Vec<LightBounds> = self.nodes().map(|node| node.bounds()).collect();
+        LightBounds::around(&rounded)
+    }
+
     /// A lane, decoded for the importance.
     #[inline]
     pub(super) fn cluster(&self, lane: usize) -> Cluster {
@@ -91,6 +101,10 @@ impl Group {
 
     pub(super) fn set_energy(&mut self, lane: usize, energy: f32) {
         self.energy[lane] = energy;
+    }
+
+    pub(super) fn set_link(&mut self, lane: usize, link: Link) {
+        self.link[lane] = link.encode();
     }
 
     /// Where a lane leads.

@@ -58,7 +58,7 @@ impl Link {
         }
     }
 
-    fn encode(self) -> u32 {
+    pub(super) fn encode(self) -> u32 {
         match self {
             Link::Nothing => 0,
             Link::Inner(ahead) => ahead,
@@ -147,10 +147,6 @@ impl Node {
 
     pub(super) fn with_energy(self, energy: f32) -> Node {
         Node { energy, ..self }
-    }
-
-    pub(super) fn with_link(self, link: Link) -> Node {
-        Node { link: link.encode(), ..self }
     }
 
     /// Decoded for the importance.

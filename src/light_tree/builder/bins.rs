@@ -1,68 +1,60 @@
 //! Bins: what a slab of a cluster holds, summed so that the partition's cost comes cheap.
 
-use super::item::Item;
+use super::item::Shape;
 use crate::bounds::{Aabb, Cone};
-use glam::{DVec4, Vec3, Vec3A};
+use glam::{DVec4, Vec3, Vec4};
 use std::f32::consts::{FRAC_PI_2, PI, TAU};
 
 /// Box, energy and spread of orientations of some items, for costs only.
 ///
 /// The cone here is not the bound that nodes get but an estimate from the mean direction (see
-/// [`Item::directed`]). Sums need no trigonometry, and prefer none of the scene's axes, which unions
+/// [`Shape::directed`]). Sums need no trigonometry, and prefer none of the scene's axes, which unions
 /// of cones, taken one after the other, cannot promise.
 #[derive(Clone, Copy)]
 pub struct Bin {
-    /// Sum over the items of energy times mean direction, and of energy.
+    /// Sum over the items of energy times mean direction, and of energy, in whole steps: exact.
     directed: DVec4,
-    min: Vec3A,
-    max: Vec3A,
-    pub count: u32,
-    theta_e: f32,
-    two_sided: bool,
+    /// As in [`Shape`].
+    min: Vec4,
+    max: Vec4,
 }
 
 impl Bin {
-    pub const EMPTY: Bin = Bin {
-        directed: DVec4::ZERO,
-        min: Vec3A::INFINITY,
-        max: Vec3A::NEG_INFINITY,
-        count: 0,
-        theta_e: 0.0,
-        two_sided: false,
-    };
+    pub const EMPTY: Bin =
+        Bin { directed: DVec4::ZERO, min: Vec4::INFINITY, max: Vec4::NEG_INFINITY };
 
-    pub fn of(item: &Item) -> Bin {
+    /// One item; `directed` is its own in [steps](super::outline::Steps).
+    pub fn of(shape: &Shape, directed: DVec4) -> Bin {
         let mut bin = Bin::EMPTY;
-        bin.add(item);
+        bin.add(shape, directed);
         bin
     }
 
+    /// Adds an item; `directed` is its own in [steps](super::outline::Steps).
     #[inline]
-    pub fn add(&mut self, item: &Item) {
-        self.count += 1;
-        self.min = self.min.min(item.min);
-        self.max = self.max.max(item.max);
-        self.directed += item.directed.as_dvec4();
-        self.two_sided |= item.two_sided;
-        self.theta_e = larger(self.theta_e, item.theta_e);
+    pub fn add(&mut self, shape: &Shape, directed: DVec4) {
+        self.min = self.min.min(shape.min);
+        self.max = self.max.max(shape.max);
+        self.directed += directed;
     }
 
     #[inline]
     pub fn merge(&mut self, other: &Bin) {
-        self.count += other.count;
         self.min = self.min.min(other.min);
         self.max = self.max.max(other.max);
         self.directed += other.directed;
-        self.two_sided |= other.two_sided;
-        self.theta_e = self.theta_e.max(other.theta_e);
+    }
+
+    pub fn is_empty(&self) -> bool {
+        self.min.x > self.max.x
     }
 
     /// Chance that a point somewhere samples this cluster: energy times area times solid angle.
     pub fn cost(&self) -> f64 {
-        if self.count == 0 {
+        if self.is_empty() {
             return 0.0;
         }
-        let aabb = Aabb { min: self.min.into(), max: self.max.into() };
+        let aabb = Aabb { min: self.min.truncate(), max: self.max.truncate() };
         self.directed.w * aabb.measure() * f64::from(self.orientation_measure())
     }
 
@@ -70,18 +62,12 @@ impl Bin {
     fn orientation_measure(&self) -> f32 {
         let (directed, energy) = (self.directed.truncate(), self.directed.w);
         let cos_o = (2.0 * (directed.length() / energy).min(1.0) - 1.0) as f32;
-        if self.theta_e == FRAC_PI_2 {
-            return measure_of_faces(cos_o, self.two_sided);
+        let (theta_e, two_sided) = (self.max.w, self.min.w < 0.0);
+        if theta_e == FRAC_PI_2 {
+            return measure_of_faces(cos_o, two_sided);
         }
-        let (theta_e, two_sided) = (self.theta_e, self.two_sided);
         Cone { axis: Vec3::Z, theta_o: cos_o.acos(), theta_e, two_sided }.measure()
     }
-}
-
-/// The larger of two numbers: `f32::max` is several instructions, for the sake of NaN.
-#[inline]
-fn larger(a: f32, b: f32) -> f32 {
-    if b > a { b } else { a }
 }
 
 /// [`Cone::measure`] for `theta_e = pi/2`, which is all but spots, without trigonometry:

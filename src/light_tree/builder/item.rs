@@ -1,27 +1,55 @@
-//! What the partition needs to know of one of the bounds that a tree is built over.
+//! What the partition needs to know of the bounds that a tree is built over.
 
 use crate::bounds::LightBounds;
-use glam::{Vec3, Vec3A, Vec4};
+use glam::{Vec3, Vec4};
+use rayon::prelude::*;
 use std::f32::consts::PI;
 
-/// One of the bounds, prepared for costs: what is summed stands as vector instructions want it, in one
-/// cache line.
+/// Some of the bounds, prepared for costs: what is read together stands together.
+pub struct Items {
+    /// Their centres, and their energies.
+    pub centers: Vec<Vec4>,
+    pub shapes: Vec<Shape>,
+    /// Where they stood in the input.
+    pub inputs: Vec<u32>,
+}
+
+/// What bins sum, as vector instructions want it.
 #[derive(Clone, Copy)]
-#[repr(align(64))]
-pub struct Item {
-    pub min: Vec3A,
-    pub max: Vec3A,
+pub struct Shape {
+    /// Smallest corner, and -1 if it is two-sided: what bins keep the minimum of.
+    pub min: Vec4,
+    /// Largest corner, and `theta_e`: what bins keep the maximum of.
+    pub max: Vec4,
     /// Energy times mean direction, and energy. Normals spread evenly over a cap of half angle
     /// `theta_o` have a mean of length `(1 + cos theta_o) / 2`.
     pub directed: Vec4,
-    pub theta_e: f32,
-    pub two_sided: bool,
-    /// Where it stood in the input.
-    pub index: u32,
 }
 
-impl Item {
-    pub fn new(bounds: &LightBounds, index: u32) -> Item {
+impl Items {
+    pub fn new(bounds: &[LightBounds]) -> Items {
+        let center = |bounds: &LightBounds| bounds.aabb.center().extend(bounds.energy);
+        let item = |bounds: &LightBounds| (center(bounds), Shape::new(bounds));
+        let (centers, shapes) = bounds.par_iter().map(item).unzip();
+        Items { centers, shapes, inputs: (0..bounds.len() as u32).collect() }
+    }
+
+    /// A copy of some, named by their places.
+    pub fn gather(&self, places: &[u32]) -> Items {
+        Items {
+            centers: places.iter().map(|&at| self.centers[at as usize]).collect(),
+            shapes: places.iter().map(|&at| self.shapes[at as usize]).collect(),
+            inputs: places.iter().map(|&at| self.inputs[at as usize]).collect(),
+        }
+    }
+
+    pub fn len(&self) -> usize {
+        self.inputs.len()
+    }
+}
+
+impl Shape {
+    fn new(bounds: &LightBounds) -> Shape {
         let LightBounds { aabb, cone, energy, .. } = *bounds;
         // Faces and points are most of all, and need no cosine.
         let mean = match cone.theta_o {
@@ -30,30 +58,11 @@ impl Item {
             theta_o => 0.5 + 0.5 * theta_o.cos(),
         };
         let axis = if cone.two_sided { upwards(cone.axis) } else { cone.axis };
-        Item {
-            min: aabb.min.into(),
-            max: aabb.max.into(),
+        Shape {
+            min: aabb.min.extend(if cone.two_sided { -1.0 } else { 0.0 }),
+            max: aabb.max.extend(cone.theta_e),
             directed: (axis * (energy * mean)).extend(energy),
-            theta_e: cone.theta_e,
-            two_sided: cone.two_sided,
-            index,
         }
-    }
-
-    /// Whether two cannot be told apart by what is known here: so of all with the same bounds, and of
-    /// few others.
-    pub fn looks_like(&self, other: &Item) -> bool {
-        // Bit by bit: the order of bounds tells 0 from -0.
-        let bits = |item: &Item| {
-            let corners = [item.min, item.max].map(|corner| corner.to_array().map(f32::to_bits));
-            (corners, item.directed.to_array().map(f32::to_bits))
-        };
-        bits(self) == bits(other)
-    }
-
-    #[inline]
-    pub fn center(&self) -> Vec3A {
-        0.5 * self.min + 0.5 * self.max
     }
 }
 

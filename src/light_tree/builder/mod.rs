@@ -4,14 +4,16 @@
 //! costliest part, and so on until there are eight, which become the lanes of its group. Bounds
 //! are then gathered bottom-up.
 //!
-//! What the bytes depend on is the *set* of bounds: the items are first brought into a canonical
-//! order, every sum runs in that order, and what tasks built side by side is put together in that
-//! order. Neither the number of threads nor the order of the input shows. The same holds of every
-//! cluster: its groups follow from its own items, wherever it stands in the tree.
+//! What the bytes depend on is the *set* of bounds: sums are exact in any order
+//! ([`outline::Steps`]), cuts go where items differ, and where they do not, [`order`] decides. Neither
+//! the number of threads nor the order of the input shows. The same holds of every cluster: its groups
+//! follow from its own items, wherever it stands in the tree.
 
+mod apart;
 mod bins;
 mod item;
 mod order;
+mod outline;
 mod reuse;
 mod saoh;
 
@@ -19,20 +21,27 @@ pub(super) use reuse::{CHANGED, Earlier};
 
 use super::group::{Group, WIDTH};
 use super::node::{Link, MOST, Node};
-use crate::bounds::{Aabb, LightBounds};
+use crate::bounds::LightBounds;
+use apart::Apart;
 use bytemuck::Zeroable;
-use item::Item;
+use item::Items;
+use outline::Outline;
 use rayon::prelude::*;
-use reuse::Reuse;
+use reuse::{Found, Reuse};
 use saoh::Halves;
 
 /// Changes whenever the same bounds would give other bytes: part of every fingerprint.
-pub const ALGORITHM_VERSION: u32 = 3;
+pub const ALGORITHM_VERSION: u32 = 4;
 
 /// Below this depth clusters are cut by count: no input makes the recursion much deeper.
 const DEEPEST_BY_COST: usize = 100;
 /// The children of larger clusters are built side by side.
 const PARALLEL_ABOVE: usize = 4096;
+/// A cluster that is sparser among the items than one in so many gets a copy of its own, where its
+/// items are neighbours in memory.
+const SPARSE: usize = 4;
+/// So many items are near enough to each other: they fit a core's own cache.
+const NEAR: usize = 4096;
 
 /// Builds a tree over some bounds, all of them [sound](LightBounds::is_sound), and appends its
 /// groups to `out` in preorder, a group before those of its children; `link` tells what each of the
@@ -51,23 +60,26 @@ pub(super) fn build_tree<'e>(
     if bounds.is_empty() {
         return None;
     }
-    let (items, earlier) = rayon::join(|| order::canonical(bounds), earlier);
-    out.reserve(earlier.as_ref().map_or(0, |earlier| earlier.groups.len()));
-    let reuse = || earlier.map(|earlier| Reuse::new(earlier, &items));
-    let (centers, reuse) = rayon::join(|| saoh::center_box(&items), reuse);
-    let builder = Builder { bounds, items, link, reuse };
-    let mut places: Vec<u32> = (0..bounds.len() as u32).collect();
-    let all = Cluster { places: &mut places, centers, cost: f64::INFINITY };
+    let prepare = || {
+        let items = Items::new(bounds);
+        let outline = Outline::around(&items.centers);
+        (items, outline)
+    };
+    let reuse = || earlier().map(|earlier| Reuse::new(earlier, bounds));
+    let ((items, outline), reuse) = rayon::join(prepare, reuse);
+    out.reserve(reuse.as_ref().map_or(0, Reuse::group_count));
+    let builder = Builder { bounds, items: &items, link, reuse: reuse.as_ref() };
+    let mut places = items.inputs.clone();
+    let all = Cluster { places: &mut places, outline, cost: f64::INFINITY };
     let around = builder.build_cluster(all, 0, out);
-    Some((around, builder.reuse.map_or(0, |reuse| reuse.reused())))
+    Some((around, reuse.map_or(0, |reuse| reuse.reused())))
 }
 
 /// Some of the items.
 struct Cluster<'a> {
-    /// Their places in the canonical order, ascending.
+    /// Where they stand among the items of the builder.
     places: &'a mut [u32],
-    /// The box around their centres.
-    centers: Aabb,
+    outline: Outline,
     /// What it costs, as [`saoh`] counts.
     cost: f64,
 }
@@ -87,26 +99,51 @@ struct Below {
     bounds: LightBounds,
 }
 
-/// What is the same for all clusters.
+/// What is the same for many clusters.
+#[derive(Clone, Copy)]
 struct Builder<'a, L> {
     bounds: &'a [LightBounds],
-    /// In canonical order.
-    items: Vec<Item>,
+    /// All items, or those of a large cluster.
+    items: &'a Items,
     link: &'a L,
-    reuse: Option<Reuse<'a>>,
+    reuse: Option<&'a Reuse<'a>>,
 }
 
 impl<L: Fn(usize) -> Link + Sync> Builder<'_, L> {
-    /// Builds the groups of a cluster and returns its bounds as its nodes have them: rounded outwards
-    /// already, so that what a node says of itself contains what its children say.
+    /// The groups of a cluster, copied or built. Returns its bounds as its nodes have them: rounded
+    /// outwards already, so that what a node says of itself contains what its children say.
     fn build_cluster(&self, cluster: Cluster, depth: usize, out: &mut Vec<Group>) -> LightBounds {
+        let Some(found) = self.find(&cluster, depth) else {
+            return self.build_anew(cluster, depth, out);
+        };
         let own = out.len();
-        if let Some(reuse) = &self.reuse
-            && let Some(found) = reuse.find(cluster.places, depth)
-        {
-            reuse.copy(found, self.link, out);
-            return bounds_of_lanes(&out[own]);
+        out.extend((0..found.group_count()).map(|at| found.group(at, self.link)));
+        out[own].bounds()
+    }
+
+    /// The groups of a cluster in the earlier tree.
+    fn find(&self, cluster: &Cluster, depth: usize) -> Option<Found<'_>> {
+        self.reuse?.find(cluster.places.iter().map(|&at| self.input(at)), depth)
+    }
+
+    /// Where an item stood in the input.
+    fn input(&self, place: u32) -> u32 {
+        self.items.inputs[place as usize]
+    }
+
+    fn build_anew(&self, cluster: Cluster, depth: usize, out: &mut Vec<Group>) -> LightBounds {
+        let is_sparse = cluster.places.len() * SPARSE < self.items.len();
+        if !is_sparse || self.items.len() <= NEAR {
+            return self.build_group(cluster, depth, out);
         }
+        let items = &self.items.gather(cluster.places);
+        cluster.places.iter_mut().zip(0..).for_each(|(place, at)| *place = at);
+        Builder { items, ..*self }.build_group(cluster, depth, out)
+    }
+
+    /// The group of a cluster, and those below it.
+    fn build_group(&self, cluster: Cluster, depth: usize, out: &mut Vec<Group>) -> LightBounds {
+        let own = out.len();
         out.push(Group::zeroed());
         let go_parallel = cluster.places.len() > PARALLEL_ABOVE;
         let mut parts = self.divide(cluster, depth);
@@ -121,13 +158,13 @@ impl<L: Fn(usize) -> Link + Sync> Builder<'_, L> {
                     Node::encode(&bounds, Link::Inner((first - own) as u32))
                 }
                 None => {
-                    let index = self.items[part.places[0] as usize].index as usize;
+                    let index = self.input(part.places[0]) as usize;
                     Node::encode(&self.bounds[index], (self.link)(index))
                 }
             };
             out[own].set(lane, &node);
         }
-        bounds_of_lanes(&out[own])
+        out[own].bounds()
     }
 
     /// The groups of a part of a cluster; `None` if it is but one item.
@@ -146,26 +183,18 @@ impl<L: Fn(usize) -> Link + Sync> Builder<'_, L> {
         out: &mut Vec<Group>,
     ) -> Vec<Option<Below>> {
         let build = |part: &mut Cluster| {
-            let mut groups = Vec::new();
-            (self.build_below(part, depth, &mut groups), groups)
-        };
-        let (mut below, apart): (Vec<_>, Vec<_>) = parts.par_iter_mut().map(build).unzip();
-        // Behind the last group of each part, counted from the first of all.
-        let mut ends = Vec::with_capacity(WIDTH);
-        let mut end = 0;
-        for (below, groups) in below.iter_mut().zip(&apart) {
-            if let Some(below) = below {
-                below.first = out.len() + end;
+            if part.places.len() == 1 {
+                return Apart::Leaf;
             }
-            end += groups.len();
-            ends.push(end);
-        }
-        let group = |at: usize| {
-            let part = ends.partition_point(|&end| end <= at);
-            apart[part][at + apart[part].len() - ends[part]]
+            if let Some(found) = self.find(part, depth) {
+                return Apart::Found(found);
+            }
+            let mut groups = Vec::new();
+            let bounds = self.build_anew(part.take(), depth, &mut groups);
+            Apart::Built { groups, bounds }
         };
-        out.par_extend((0..end).into_par_iter().map(group));
-        below
+        let parts: Vec<Apart> = parts.par_iter_mut().map(build).collect();
+        apart::append(&parts, self.link, out)
     }
 
     /// Cuts a cluster into up to eight parts: the costliest first of those that fill a group of their
@@ -176,31 +205,32 @@ impl<L: Fn(usize) -> Link + Sync> Builder<'_, L> {
         parts.push(cluster);
         while let Some(at) = next_to_cut(&parts) {
             let lanes_left = WIDTH - parts.len();
-            let Cluster { places, centers, .. } = parts[at].take();
+            let Cluster { places, outline, .. } = parts[at].take();
+            let part = |places, outline, cost| Cluster { places, outline, cost };
             if places.len() - 1 <= lanes_left {
-                let one = |places| Cluster { places, centers, cost: 0.0 };
-                parts.splice(at..=at, places.chunks_mut(1).map(one));
+                self.sort(places);
+                parts.splice(at..=at, places.chunks_mut(1).map(|one| part(one, outline, 0.0)));
                 continue;
             }
             let by_cost = (depth < DEEPEST_BY_COST)
-                .then(|| saoh::partition(&self.items, places, &centers))
+                .then(|| saoh::partition(self.items, places, &outline))
                 .flatten();
-            let halves = by_cost.unwrap_or(Halves::even(places.len(), centers));
-            let (left, right) = places.split_at_mut(halves.left_count);
-            let half = |i: usize, places| {
-                let (centers, cost) = (halves.centers[i], halves.cost[i]);
-                Cluster { places, centers, cost }
-            };
-            parts.splice(at..=at, [half(0, left), half(1, right)]);
+            let Halves { left_count, cost, outlines } = by_cost.unwrap_or_else(|| {
+                self.sort(places);
+                Halves { left_count: places.len() / 2, cost: [0.0; 2], outlines: [outline; 2] }
+            });
+            let (left, right) = places.split_at_mut(left_count);
+            let halves = [part(left, outlines[0], cost[0]), part(right, outlines[1], cost[1])];
+            parts.splice(at..=at, halves);
         }
         parts
     }
-}
 
-/// The bounds of a cluster as the nodes of its group have them.
-fn bounds_of_lanes(group: &Group) -> LightBounds {
-    let rounded: Vec<LightBounds> = group.nodes().map(|node| node.bounds()).collect();
-    LightBounds::around(&rounded)
+    /// Brings items that no cut tells apart into their [order].
+    fn sort(&self, places: &mut [u32]) {
+        let compare = order::of(self.bounds);
+        places.sort_unstable_by(|&a, &b| compare(self.input(a), self.input(b)));
+    }
 }
 
 /// Which part to cut next; `None` if all lanes are used or none can be cut.
@@ -216,4 +246,44 @@ fn next_to_cut(parts: &[Cluster]) -> Option<usize> {
     let all = 0..parts.len();
     let large = all.clone().filter(|&at| size(at) > WIDTH).max_by(by_cost);
     large.or_else(|| all.filter(|&at| size(at) > 1).min_by(by_size))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::bounds::{Aabb, Cone};
+    use glam::Vec3;
+
+    /// On how many levels the groups of a tree stand.
+    fn levels(groups: &[Group]) -> usize {
+        let below = |lane| match groups[0].link(lane) {
+            Link::Inner(ahead) => levels(&groups[ahead as usize..]),
+            _ => 0,
+        };
+        1 + (0..WIDTH).map(below).max().unwrap_or(0)
+    }
+
+    #[test]
+    fn below_the_deepest_clusters_are_cut_by_count() {
+        // A cut by cost parts the last of these from all others.
+        let light = |i: i32| {
+            let aabb = Aabb::around([Vec3::X * 4f32.powi(i)]);
+            LightBounds { aabb, cone: Cone::ALL, energy: 1.0, range_m: f32::INFINITY }
+        };
+        let bounds: Vec<_> = (-30..30).map(light).collect();
+        let items = Items::new(&bounds);
+        let link = |i| Link::Emitter(i as u32);
+        let builder = Builder { bounds: &bounds, items: &items, link: &link, reuse: None };
+        let height = |depth| {
+            let mut groups = Vec::new();
+            let outline = Outline::around(&items.centers);
+            let places = &mut items.inputs.clone();
+            builder.build_cluster(Cluster { places, outline, cost: 1.0 }, depth, &mut groups);
+            let leaves = groups.iter().flat_map(|group| (0..WIDTH).map(|lane| group.link(lane)));
+            assert_eq!(leaves.filter(|link| matches!(link, Link::Emitter(_))).count(), 60);
+            levels(&groups)
+        };
+        assert!(height(0) > 3);
+        assert_eq!(height(DEEPEST_BY_COST), 2);
+    }
 }

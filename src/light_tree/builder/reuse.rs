@@ -5,7 +5,8 @@
 //! what a build would give: it is copied, and its leaves are told their new numbers.
 
 use super::DEEPEST_BY_COST;
-use super::item::Item;
+use super::order;
+use crate::bounds::LightBounds;
 use crate::light_tree::group::{Group, WIDTH};
 use crate::light_tree::node::Link;
 use rayon::prelude::*;
@@ -19,6 +20,8 @@ pub struct Earlier<'a> {
     /// For each of the new bounds its leaf: the number of the group in the tree times [`WIDTH`] plus
     /// the lane; [`CHANGED`] if there is none.
     pub slots: Vec<u32>,
+    /// Whether those that have one followed each other as they do now.
+    pub in_order: bool,
 }
 
 /// The slot of what is not in the earlier tree.
@@ -28,10 +31,10 @@ pub const CHANGED: u32 = u32::MAX;
 pub struct Reuse<'a> {
     groups: &'a [Group],
     subtrees: Vec<Subtree>,
-    /// For each item, in canonical order, the slot of its leaf.
+    /// As in [`Earlier`].
     slots: Vec<u32>,
-    /// For each slot where the item of its leaf stood in the input.
-    inputs: Vec<u32>,
+    /// For each slot the place of its leaf among the new bounds.
+    places: Vec<u32>,
     height: usize,
     reused: AtomicU32,
 }
@@ -46,27 +49,40 @@ struct Subtree {
 }
 
 impl<'a> Reuse<'a> {
-    pub fn new(earlier: Earlier<'a>, items: &[Item]) -> Reuse<'a> {
-        let Earlier { groups, slots } = earlier;
-        let slot = |item: &Item| slots[item.index as usize];
-        let ((subtrees, height), mut slots) =
-            rayon::join(|| measure(groups), || items.par_iter().map(slot).collect::<Vec<u32>>());
-        forget_swapped(&mut slots, groups, items);
-        let mut inputs = vec![CHANGED; groups.len() * WIDTH];
-        for (&slot, item) in slots.iter().zip(items).filter(|(slot, _)| **slot != CHANGED) {
-            inputs[slot as usize] = item.index;
+    pub fn new(earlier: Earlier<'a>, bounds: &[LightBounds]) -> Reuse<'a> {
+        let Earlier { groups, mut slots, in_order } = earlier;
+        if !in_order {
+            forget_swapped(&mut slots, groups, bounds);
         }
-        Reuse { groups, subtrees, slots, inputs, height, reused: AtomicU32::new(0) }
+        let place = || {
+            let mut places = vec![CHANGED; groups.len() * WIDTH];
+            for (&slot, place) in slots.iter().zip(0..).filter(|(slot, _)| **slot != CHANGED) {
+                places[slot as usize] = place;
+            }
+            places
+        };
+        let ((subtrees, height), places) = rayon::join(|| measure(groups), place);
+        Reuse { groups, subtrees, slots, places, height, reused: AtomicU32::new(0) }
     }
 
-    /// The groups that a build of a cluster would give, if the earlier tree has them.
-    pub fn find(&self, cluster: &[u32], depth: usize) -> Option<Range<usize>> {
+    /// How many groups the earlier tree has.
+    pub fn group_count(&self) -> usize {
+        self.groups.len()
+    }
+
+    /// The groups that a build of a cluster would give, if the earlier tree has them; the cluster by the
+    /// places of its bounds.
+    pub fn find(
+        &self,
+        cluster: impl ExactSizeIterator<Item = u32>,
+        depth: usize,
+    ) -> Option<Found<'_>> {
         // Deeper down, clusters are cut otherwise.
         if depth + self.height > DEEPEST_BY_COST {
             return None;
         }
-        let (mut first, mut last) = (u32::MAX, 0);
-        for &place in cluster {
+        let (count, mut first, mut last) = (cluster.len() as u32, u32::MAX, 0);
+        for place in cluster {
             let slot = self.slots[place as usize];
             if slot == CHANGED {
                 return None;
@@ -74,38 +90,47 @@ impl<'a> Reuse<'a> {
             (first, last) = (first.min(slot), last.max(slot));
         }
         let mut root = first as usize / WIDTH;
-        while (self.subtrees[root].leaves as usize) < cluster.len() && root > 0 {
+        while self.subtrees[root].leaves < count && root > 0 {
             root = self.subtrees[root].parent as usize;
         }
         let Subtree { end, leaves, .. } = self.subtrees[root];
         // As many leaves, all of them inside: then they are the same.
-        let is_same = leaves as usize == cluster.len() && last as usize / WIDTH < end as usize;
-        is_same.then_some(root..end as usize)
+        let is_same = leaves == count && last as usize / WIDTH < end as usize;
+        is_same.then(|| {
+            self.reused.fetch_add(leaves, Ordering::Relaxed);
+            Found { reuse: self, groups: root..end as usize }
+        })
     }
 
-    /// Appends groups that were found.
-    pub fn copy(&self, found: Range<usize>, link: impl Fn(usize) -> Link, out: &mut Vec<Group>) {
-        let first = out.len();
-        out.extend_from_slice(&self.groups[found.clone()]);
-        for (number, group) in found.clone().zip(&mut out[first..]) {
-            for lane in 0..WIDTH {
-                let old = group.link(lane);
-                if !is_leaf(old) {
-                    continue;
-                }
-                let new = link(self.inputs[number * WIDTH + lane] as usize);
-                if new != old {
-                    let node = group.node(lane).expect("a leaf").with_link(new);
-                    group.set(lane, &node);
-                }
-            }
-        }
-        self.reused.fetch_add(self.subtrees[found.start].leaves, Ordering::Relaxed);
-    }
-
-    /// How many leaves were copied.
+    /// How many leaves were found.
     pub fn reused(&self) -> usize {
         self.reused.load(Ordering::Relaxed) as usize
+    }
+}
+
+/// A subtree of the earlier tree that a build would give again.
+pub struct Found<'a> {
+    reuse: &'a Reuse<'a>,
+    groups: Range<usize>,
+}
+
+impl Found<'_> {
+    /// How many groups it has.
+    pub fn group_count(&self) -> usize {
+        self.groups.len()
+    }
+
+    /// One of them, its leaves linked to what they stand for now.
+    pub fn group(&self, at: usize, link: impl Fn(usize) -> Link) -> Group {
+        let number = self.groups.start + at;
+        let mut group = self.reuse.groups[number];
+        for lane in 0..WIDTH {
+            if is_leaf(group.link(lane)) {
+                let place = self.reuse.places[number * WIDTH + lane];
+                group.set_link(lane, link(place as usize));
+            }
+        }
+        group
     }
 }
 
@@ -134,17 +159,19 @@ fn measure(groups: &[Group]) -> (Vec<Subtree>, usize) {
     (subtrees, heights.first().copied().unwrap_or(0))
 }
 
-/// Items with the same bounds follow each other by their numbers. Where they followed each other
-/// otherwise in the earlier tree, a build would swap them: then none of them counts as unchanged.
-fn forget_swapped(slots: &mut [u32], groups: &[Group], items: &[Item]) {
+/// Equal bounds follow each other by their numbers. Where they followed each other otherwise in the
+/// earlier tree, a build would swap them: then none of them counts as unchanged.
+fn forget_swapped(slots: &mut [u32], groups: &[Group], bounds: &[LightBounds]) {
     let old = |slot: u32| groups[slot as usize / WIDTH].link(slot as usize % WIDTH);
-    let is_twin = |at: &usize| items[at - 1].looks_like(&items[*at]);
-    let twins: Vec<usize> = (1..items.len()).into_par_iter().filter(is_twin).collect();
-    for run in twins.chunk_by(|a, b| a + 1 == *b) {
-        let slots = &mut slots[run[0] - 1..run[0] + run.len()];
-        let known = slots.iter().copied().filter(|&slot| slot != CHANGED);
+    let compare = order::of(bounds);
+    let is_twin =
+        |a: &u32, b: &u32| order::by_numbers(&bounds[*a as usize], &bounds[*b as usize]).is_eq();
+    let mut sorted: Vec<u32> = (0..bounds.len() as u32).collect();
+    sorted.par_sort_unstable_by(|&a, &b| compare(a, b));
+    for twins in sorted.chunk_by(is_twin).filter(|run| run.len() > 1) {
+        let known = twins.iter().map(|&at| slots[at as usize]).filter(|&slot| slot != CHANGED);
         if !known.is_sorted_by(|&a, &b| old(a) < old(b)) {
-            slots.fill(CHANGED);
+            twins.iter().for_each(|&at| slots[at as usize] = CHANGED);
         }
     }
 }
