@@ -1,10 +1,14 @@
 //! Bytes in memory with the alignment of a mapped file.
 
 use bytemuck::{Pod, Zeroable};
+use rayon::prelude::*;
 
 /// Sections start at multiples of this, so that any plain-old-data type can be viewed in place and
 /// no node straddles two cache lines.
 pub const ALIGNMENT: usize = 64;
+
+/// Blocks zeroed by one task at least.
+const TOGETHER: usize = 1 << 12;
 
 #[derive(Clone, Copy, Pod, Zeroable)]
 #[repr(C, align(64))]
@@ -20,7 +24,9 @@ pub struct AlignedBytes {
 impl AlignedBytes {
     /// A zeroed buffer of `length` bytes.
     pub fn zeroed(length: usize) -> AlignedBytes {
-        AlignedBytes { blocks: bytemuck::zeroed_vec(length.div_ceil(ALIGNMENT)), length }
+        // Side by side: memory costs most when it is touched for the first time.
+        let blocks = (0..length.div_ceil(ALIGNMENT)).into_par_iter().with_min_len(TOGETHER);
+        AlignedBytes { blocks: blocks.map(|_| Block::zeroed()).collect(), length }
     }
 
     /// A copy of some bytes.

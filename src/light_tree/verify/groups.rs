@@ -1,11 +1,10 @@
 //! Whether the groups of a tree form one: all are reached, once, and each lies inside its parent.
 
-use super::{Checked, rules};
+use super::{Checked, first_violation, rules};
 use crate::light_tree::group::{Group, WIDTH};
 use crate::light_tree::node::{Link, Node};
 use crate::light_tree::records::TreeRow;
 use crate::store::{Record, Rule, Violation};
-use rayon::prelude::*;
 
 /// Energies are sums of a few `f32`.
 const ENERGY_TOLERANCE: f64 = 1e-6;
@@ -31,9 +30,7 @@ pub(super) fn verify_groups(tree: &TreeRow, groups: &[Group]) -> Checked {
         };
         check_group(&groups[own], &parent).map_err(|broken| name(own, broken))
     };
-    // The first in the file, however many threads look for it.
-    let broken = (0..groups.len()).into_par_iter().map(check).find_first(Result::is_err);
-    broken.unwrap_or(Ok(()))
+    first_violation(groups.len(), check)
 }
 
 /// For each group the slot of the lane that leads to it; or the group that is out of order, and the lane

@@ -1,11 +1,10 @@
 //! What `verify` checks of lights, and of the frames in which they shine.
 
-use super::{Checked, check, check_all, rules};
+use super::{Checked, check, check_all, first_violation, rules};
 use crate::light_tree::group::WIDTH;
 use crate::light_tree::node::MOST;
 use crate::light_tree::records::{FrameRow, LightRow, NO_TREE, TreeKind};
 use crate::light_tree::tree::LightTree;
-use rayon::prelude::*;
 
 /// The number of the emitter behind a light's.
 fn next_emitter(light: &LightRow) -> u64 {
@@ -16,8 +15,7 @@ impl<D: AsRef<[u8]> + Sync> LightTree<D> {
     /// The lights' rows.
     pub(super) fn verify_lights(&self) -> Checked {
         let lights = self.lights();
-        let broken = (0..lights.len()).into_par_iter().map(|row| self.verify_light(row));
-        broken.find_first(Result::is_err).unwrap_or(Ok(()))?;
+        first_violation(lights.len(), |row| self.verify_light(row))?;
         // More leaves than lanes are not to be looked for.
         let own = u64::from(self.first_of_class(LightRow::PLACED));
         let lanes = (self.groups().len() * WIDTH) as u64;
