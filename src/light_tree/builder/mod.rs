@@ -37,6 +37,8 @@ pub const ALGORITHM_VERSION: u32 = 4;
 const DEEPEST_BY_COST: usize = 100;
 /// The children of larger clusters are built side by side.
 const PARALLEL_ABOVE: usize = 4096;
+/// Items summed or moved by one task.
+const CHUNK: usize = 4096;
 /// A cluster that is sparser among the items than one in so many gets a copy of its own, where its
 /// items are neighbours in memory.
 const SPARSE: usize = 4;

@@ -1,10 +1,8 @@
 //! What a partition must know of a cluster before it looks at its items.
 
+use super::CHUNK;
 use glam::{DVec4, Vec3, Vec4};
 use rayon::prelude::*;
-
-/// Items looked at by one task.
-const CHUNK: usize = 1 << 13;
 
 /// The box around the centres of some items, and the largest of their energies.
 #[derive(Clone, Copy)]

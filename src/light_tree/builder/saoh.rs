@@ -8,6 +8,7 @@
 //! A cut goes between centres that differ along its axis, and all sums are exact. So the halves, as
 //! sets, follow from the set that is cut: in which order its items are listed does not show.
 
+use super::CHUNK;
 use super::bins::Bin;
 use super::item::Items;
 use super::outline::Outline;
@@ -18,8 +19,6 @@ use rayon::prelude::*;
 const BINS: usize = 16;
 /// Clusters up to this size are cut between any two neighbours.
 const EXACT_UP_TO: usize = BINS;
-/// Items summed or moved by one task.
-const CHUNK: usize = 1 << 12;
 
 /// A cluster, cut in two.
 pub struct Halves {
@@ -149,9 +148,12 @@ fn cheapest_cut(
     let mut left = Bin::EMPTY;
     for after in 0..bins.len() - 1 {
         left.merge(&bins[after]);
+        if !divides(after) {
+            continue;
+        }
         let cost = [left.cost(), right_costs[after + 1]];
         let total = kr * (cost[0] + cost[1]);
-        if divides(after) && best.as_ref().is_none_or(|best| total < best.total) {
+        if best.as_ref().is_none_or(|best| total < best.total) {
             *best = Some(Cut { total, cost, axis, after });
         }
     }
@@ -195,7 +197,8 @@ impl Slabs {
     }
 }
 
-/// Brings the items of the left half to the front and counts them; both halves keep their order, in which memory is read. Returns the outlines of both, too.
+/// Brings the items of the left half to the front and counts them; both halves keep their order, in
+/// which memory is read. Returns the outlines of both, too.
 fn move_to_front(
     items: &Items,
     cluster: &mut [u32],
