@@ -10,7 +10,8 @@
 
 use super::group::WIDTH;
 use super::leaves::{Route, lane_toward};
-use super::sampling::{FrameTree, Next, Place};
+use super::place::{Next, Place, Weighed};
+use super::sampling::FrameTree;
 use super::splitting::{Rounded, SplitTest, Splitting, allot};
 use super::viewer::Viewer;
 
@@ -127,8 +128,8 @@ impl FrameTree<'_> {
             }
             let mut is_first = true;
             while let Some(Opened { place, leg, weight, opened, cap }) = open.pop() {
-                let Some(group) = self.group(&place) else { continue };
-                let (mut importances, spreads) = group.weigh(&place.viewer);
+                let Some(weighed) = self.weigh(&place) else { continue };
+                let Weighed { group, mut importances, spreads } = weighed;
                 let sum: f64 = importances.iter().sum();
                 if !(sum > 0.0 && sum.is_finite()) {
                     continue;
@@ -158,7 +159,7 @@ impl FrameTree<'_> {
                     // Barely opened, all parts together still have no more than what they are part of.
                     let cap = opened + (1.0 - opened) * cap * weighed[lane] / sum;
                     let leg = on_route.filter(|&(own, _)| own == lane).map(|(_, leg)| leg);
-                    let (entry, part) = match self.follow(&place, group.link(lane)) {
+                    let (entry, part) = match self.follow(&place, group, lane) {
                         None => continue,
                         Some(Next::Emitter(emitter)) => {
                             (Entry::Light(Picked::Emitter(emitter)), 0.0)

@@ -5,10 +5,11 @@
 //! stand in preorder: there is no bit trail to store, and no depth at which it ends. Along it every
 //! decision is weighed by the code that picks, so both agree to the last bits.
 
-use super::group::{Group, WIDTH};
+use super::group::WIDTH;
 use super::leaves::{Route, find_placed, lane_toward};
 use super::node::Link;
-use super::sampling::{FrameTree, Next, Place, Weights};
+use super::place::{Next, Place, Weighed};
+use super::sampling::FrameTree;
 use super::viewer::Viewer;
 
 impl FrameTree<'_> {
@@ -32,23 +33,26 @@ impl FrameTree<'_> {
             self.place_of_root(viewer).map(|root| (root, 1.0)).into_iter().collect();
         let mut reached = Vec::new();
         while let Some((root, probability)) = open.pop() {
-            let groups = self.groups_of_tree_at(root.at);
             reached.clear();
-            reached.resize(groups.len(), 0.0);
-            reached.iter_mut().take(1).for_each(|first| *first = probability);
+            reached.push(probability);
             // Groups stand in preorder: when one is met, the way to it has been.
-            for (at, group) in groups.iter().enumerate() {
-                let before: f64 = reached[at];
-                let weights = Weights::of(group, &root.viewer).filter(|_| before > 0.0);
-                let Some(weights) = weights else { continue };
-                for lane in (0..WIDTH).filter(|&lane| weights.of_lane[lane] > 0.0) {
-                    let probability = before * weights.share(lane);
-                    if let Link::Inner(ahead) = group.link(lane) {
-                        let below = reached.get_mut(at + ahead as usize);
-                        below.into_iter().for_each(|below| *below = probability);
+            for (at, place) in self.groups_below(&root).enumerate() {
+                let before = reached.get(at).copied().unwrap_or(0.0);
+                if before <= 0.0 {
+                    continue;
+                }
+                let Some(choice) = self.weigh(&place).and_then(Weighed::choice) else { continue };
+                for lane in (0..WIDTH).filter(|&lane| choice.of_lane[lane] > 0.0) {
+                    let probability = before * choice.share(lane);
+                    if let Link::Inner(ahead) = choice.group.link(lane) {
+                        let below = at + ahead as usize;
+                        if below < self.groups.len() {
+                            reached.resize(reached.len().max(below + 1), 0.0);
+                            reached[below] = probability;
+                        }
                         continue;
                     }
-                    match self.follow(&root, group.link(lane)) {
+                    match self.follow(&place, choice.group, lane) {
                         Some(Next::Emitter(emitter)) => visit(emitter, probability),
                         Some(Next::Group(below)) => open.push((below, probability)),
                         None => {}
@@ -56,14 +60,6 @@ impl FrameTree<'_> {
                 }
             }
         }
-    }
-
-    /// All groups of the tree that has its root's children here.
-    fn groups_of_tree_at(&self, first: u32) -> &[Group] {
-        let after = self.trees.partition_point(|tree| tree.first_group <= first);
-        let count = after.checked_sub(1).map_or(0, |row| self.trees[row].group_count);
-        let rest = self.groups.get(first as usize..).unwrap_or_default();
-        &rest[..rest.len().min(count as usize)]
     }
 
     pub(super) fn route(&self, emitter: u32) -> Option<Route> {
@@ -90,14 +86,14 @@ impl FrameTree<'_> {
         for (leg, &slot) in route.slots[..route.count].iter().enumerate().skip(legs) {
             let target = slot / WIDTH as u32;
             loop {
-                let group = self.group(&place)?;
+                let choice = self.weigh(&place)?.choice()?;
                 let is_last = place.at == target;
                 let lane = match is_last {
                     true => slot as usize % WIDTH,
-                    false => lane_toward(group, target.checked_sub(place.at)?)?,
+                    false => lane_toward(choice.group, target.checked_sub(place.at)?)?,
                 };
-                probability *= Weights::of(group, &place.viewer)?.share(lane);
-                match self.follow(&place, group.link(lane))? {
+                probability *= choice.share(lane);
+                match self.follow(&place, choice.group, lane)? {
                     Next::Group(next) => place = next,
                     Next::Emitter(_) if is_last && leg + 1 == route.count => {
                         return Some(probability);

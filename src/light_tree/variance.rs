@@ -10,8 +10,8 @@
 
 use super::cut::{Entry, Picked, Scratch};
 use super::group::WIDTH;
-use super::node::Link;
-use super::sampling::{FrameTree, Next, Place, Weights};
+use super::place::{Choice, Next, Place};
+use super::sampling::FrameTree;
 use super::splitting::{Splitting, comb};
 use super::viewer::Viewer;
 
@@ -85,7 +85,7 @@ impl FrameTree<'_> {
         let mut levels: Vec<Level<V>> = self.level(place, expected).into_iter().collect();
         let mut found = (0.0, 0.0);
         while let Some(level) = levels.last_mut() {
-            let alive = |lane: &usize| level.weights.of_lane[*lane] > 0.0;
+            let alive = |lane: &usize| level.choice.of_lane[*lane] > 0.0;
             let Some(lane) = (level.next..WIDTH).find(alive) else {
                 let Level { mean, second, .. } = *level;
                 found = (mean, (second - mean * mean).max(0.0));
@@ -96,8 +96,8 @@ impl FrameTree<'_> {
                 continue;
             };
             level.next = lane + 1;
-            let expected = level.expected * level.weights.share(lane);
-            match self.follow(&level.place, level.links[lane]) {
+            let expected = level.expected * level.choice.share(lane);
+            match self.follow(&level.place, level.choice.group, lane) {
                 None => {}
                 Some(Next::Group(place)) => levels.extend(self.level(place, expected)),
                 Some(Next::Emitter(emitter)) => {
@@ -108,19 +108,16 @@ impl FrameTree<'_> {
         found
     }
 
-    fn level<V: Viewer>(&self, place: Place<V>, expected: f64) -> Option<Level<V>> {
-        let group = self.group(&place)?;
-        let weights = Weights::of(group, &place.viewer)?;
-        let links = std::array::from_fn(|lane| group.link(lane));
-        Some(Level { place, weights, links, expected, next: 0, mean: 0.0, second: 0.0 })
+    fn level<V: Viewer>(&self, place: Place<V>, expected: f64) -> Option<Level<'_, V>> {
+        let choice = self.weigh(&place)?.choice()?;
+        Some(Level { place, choice, expected, next: 0, mean: 0.0, second: 0.0 })
     }
 }
 
 /// A group on the way of a walk over all that a descent may find.
-struct Level<V> {
+struct Level<'a, V> {
     place: Place<V>,
-    weights: Weights,
-    links: [Link; WIDTH],
+    choice: Choice<'a>,
     /// How many descents come here.
     expected: f64,
     /// The lane that is looked at next.
@@ -130,11 +127,11 @@ struct Level<V> {
     second: f64,
 }
 
-impl<V> Level<V> {
+impl<V> Level<'_, V> {
     /// Adds what a lane gives, by its mean and variance.
     fn add(&mut self, lane: usize, (mean, variance): (f64, f64)) {
         self.mean += mean;
-        self.second += (variance + mean * mean) / self.weights.share(lane);
+        self.second += (variance + mean * mean) / self.choice.share(lane);
     }
 }
 

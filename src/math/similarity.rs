@@ -49,10 +49,12 @@ impl Similarity {
         Vec3::from_array(self.axes[0]).length()
     }
 
-    /// Where a point goes.
+    /// Where a point goes. In double precision until the end: far from the origin the two terms are
+    /// large and nearly cancel.
     #[inline]
     pub fn point(&self, p: Vec3) -> Vec3 {
-        self.linear() * p + Vec3::from_array(self.origin)
+        let there = self.linear().as_dmat3() * p.as_dvec3();
+        (there + Vec3::from_array(self.origin).as_dvec3()).as_vec3()
     }
 
     /// Where a unit direction points to, unit again; zero stays zero.
