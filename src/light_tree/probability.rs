@@ -1,9 +1,9 @@
-//! The way back: how probable it is that a viewer picks an emitter.
+//! The probability with which a viewer picks a given emitter.
 //!
-//! When a reflected ray hits an emitter, its weight asks how often the emitter would have been picked
-//! from the point before. The walk from the root to the emitter's leaf is known, because groups
-//! stand in preorder: there is no bit trail to store, and no depth at which it ends. Along it every
-//! decision is weighed by the code that picks, so both agree to the last bits.
+//! Multiple importance sampling asks for it when a reflected ray hits an emitter. The walk from the
+//! root to the emitter's leaf is known, because groups stand in preorder: the next child is the last
+//! one that begins at or before the leaf. No bit trail is stored, and depth has no limit. Every
+//! decision on the way is weighed by the function that picks, so both agree to the last bit.
 
 use super::group::WIDTH;
 use super::leaves::{Route, find_placed, lane_toward};
@@ -26,8 +26,8 @@ impl FrameTree<'_> {
         probability.unwrap_or(0.0)
     }
 
-    /// Calls `visit` with every emitter that is not forced and may be picked for a viewer, and the
-    /// [`probability`](FrameTree::probability) of that: of all of them in one walk.
+    /// Calls `visit` with every emitter that may be picked for a viewer, and its
+    /// [`probability`](FrameTree::probability). One walk finds all. Forced lights are left out.
     pub fn for_each_probability(&self, viewer: &impl Viewer, mut visit: impl FnMut(u32, f64)) {
         let mut open: Vec<_> =
             self.place_of_root(viewer).map(|root| (root, 1.0)).into_iter().collect();
@@ -74,8 +74,7 @@ impl FrameTree<'_> {
         self.walk(self.place_of_forced(light, viewer)?, &route, 0)
     }
 
-    /// The probability of a descent from a place to the end of a route, so many of whose legs lie
-    /// behind.
+    /// The probability of a descent from a place to the end of a route, of which `legs` legs lie behind.
     pub(super) fn walk<V: Viewer>(
         &self,
         mut place: Place<V>,

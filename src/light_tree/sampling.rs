@@ -1,9 +1,9 @@
 //! Picking one emitter for a viewer.
 //!
-//! From the root down, a child is chosen with the probability `I / sum of I` of its group, one
-//! random number stretched over all choices (seed, "Method overview"). What takes more than one
-//! sample is [beside](super::picks); what tells the probability of a pick, [too](super::probability).
-//! All weigh a group by the same code, and there is no limit to the depth.
+//! A descent starts at the root. At each group a child is chosen with probability `I / sum of I`, and
+//! the one random number is stretched after each choice (seed, "Method overview"). Taking more than
+//! one sample is in [`picks`](super::picks). [`probability`](super::probability) tells how likely a
+//! pick was. Depth has no limit.
 
 use super::cut::Picked;
 use super::group::Group;
@@ -19,13 +19,13 @@ use super::viewer::Viewer;
 pub struct Pick {
     /// Which.
     pub light: Picked,
-    /// The probability of picking it for this viewer, given what was drawn for clusters that were
-    /// split: what its contribution is divided by. Positive.
+    /// The divisor of its contribution: the probability of the pick, given the number of samples that
+    /// was drawn. Positive.
     pub probability: f64,
-    /// The expected number of samples of it for this viewer, whatever is drawn: what it is weighed
-    /// with against other ways of finding it. Positive; equals `probability` without splitting.
+    /// The expected number of samples of it over all draws: the weight of light sampling in multiple
+    /// importance sampling. Positive; equals `probability` without splitting.
     pub expected: f64,
-    /// What is left of the random number: uniform in `[0, 1)` and fresh.
+    /// The rest of the random number: uniform in `[0, 1)` and independent of the pick.
     pub leftover: f64,
 }
 
@@ -78,8 +78,8 @@ impl<D: AsRef<[u8]>> LightTree<D> {
 }
 
 impl FrameTree<'_> {
-    /// Picks an emitter with a random number in `[0, 1)`; `None` where nothing can arrive (which a
-    /// descent may learn only below a cluster whose bounds were too wide to know).
+    /// Picks an emitter with a random number in `[0, 1)`; `None` where nothing can arrive. A descent
+    /// may find that out only at a leaf, whose bounds are tighter than those above it.
     pub fn sample(&self, viewer: &impl Viewer, u: f64) -> Option<Pick> {
         self.descend(self.place_of_root(viewer)?, u)
     }
@@ -89,12 +89,12 @@ impl FrameTree<'_> {
         self.descend(self.place_of_forced(light, viewer)?, u)
     }
 
-    /// How many emitters belong to lights that are not forced: those that are come last.
+    /// The number of emitters that are not forced. Forced ones are numbered after them.
     pub fn unforced_count(&self) -> u32 {
         self.forced.first().map_or(self.emitter_count, |first| first.first_emitter)
     }
 
-    /// How many lights are forced: sampled at every point, beside what is picked.
+    /// The number of forced lights: each is sampled at every point, besides what is picked.
     pub fn forced_count(&self) -> usize {
         self.forced.len()
     }
