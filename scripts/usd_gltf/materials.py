@@ -13,7 +13,7 @@ import numpy as np
 from pxr import Sdf, Usd, UsdShade
 
 from .gltf_document import Document, number, numbers
-from .report import Report
+from .report import Notebook
 
 if TYPE_CHECKING:
     from .mesh import Piece
@@ -56,7 +56,7 @@ class Materials:
     """Resolves bindings to looks, and looks to glTF materials."""
 
     def __init__(
-        self, document: Document, read_surface: Callable[[UsdShade.Material], Look], report: Report
+        self, document: Document, read_surface: Callable[[UsdShade.Material], Look], report: Notebook
     ) -> None:
         self.document, self.read_surface, self.report = document, read_surface, report
         self._looks: dict[Sdf.Path, Look] = {}

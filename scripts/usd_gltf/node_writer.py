@@ -15,7 +15,7 @@ from .light_carriers import LightCarriers
 from .materials import Materials
 from .mesh import MeshSource
 from .prim_tree import Prim
-from .report import Report
+from .report import Notebook
 from .stage import Frames
 from .transforms import SHEAR_TOLERANCE, decompose, split_shear
 
@@ -31,7 +31,7 @@ class NodeWriter:
         materials: Materials,
         carriers: LightCarriers,
         frames: Frames,
-        report: Report,
+        report: Notebook,
     ) -> None:
         self.document, self.materials, self.carriers = document, materials, carriers
         self.frames, self.report = frames, report
@@ -54,7 +54,7 @@ class NodeWriter:
         """The node of a prim that stands under the world matrices `above`."""
         world = (prim.local if prim.resets else above @ prim.local) if prim.lit else above
         if prim.local.ndim == 3:
-            node, outer = self._moving(path, prim.name, prim.local)
+            node, outer = self._moving(path, prim.name, prim.local, prim.lit)
         else:
             if id(prim) not in self._still:
                 self._still[id(prim)] = _still(prim.local)
@@ -102,7 +102,7 @@ class NodeWriter:
             name = f"{path}[{number}]"
             matrix = matrices[:, position] if moving else matrices[position]
             if moving:
-                node, outer = self._moving(name, prototype.name, matrix)
+                node, outer = self._moving(name, prototype.name, matrix, prototype.lit)
             elif static[3][position] > SHEAR_TOLERANCE:
                 node, outer = self._placed(name, prototype.name, *_still(matrix))
             else:
@@ -120,12 +120,13 @@ class NodeWriter:
             return node, index
         return node, self.document.node({"name": f"{name}_shear", "children": [index], **outside})
 
-    def _moving(self, path: str, name: str, local: np.ndarray) -> tuple[dict, int]:
+    def _moving(self, path: str, name: str, local: np.ndarray, lit: bool) -> tuple[dict, int]:
         """A node that follows `local` (frames, 4, 4), and its index."""
         translation, rotation, scale, shear = decompose(local)
         if shear.max() > SHEAR_TOLERANCE:
             why = "translation, rotation and scale cannot hold it over time; the nearest ones are used"
-            self.report.warn(path, "animated shear", why)
+            report = self.report.about("lights") if lit else self.report
+            report.warn(path, "animated shear", why)
         node = {"name": name, "extras": {"usdPath": path}, **_place(translation[0], rotation[0], scale[0])}
         index = self.document.node(node)
         tracks = {"translation": translation, "rotation": rotation, "scale": scale}

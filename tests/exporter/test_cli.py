@@ -89,7 +89,7 @@ def test_the_report(export, tmp_path):
     result = export(LAMP + "".join(f'\ndef PluginLight "P{i}" {{}}' for i in range(500)), "--report", str(tmp_path / "r.json"))
     report = json.loads((tmp_path / "r.json").read_text())
     assert set(report) >= {"source", "output", "warnings", "counts"}
-    assert set(report["warnings"][0]) == {"path", "what", "why"}
+    assert set(report["warnings"][0]) == {"category", "path", "what", "why"}
     assert report["counts"]["lights RectLight"] == 1
     assert len(report["warnings"]) == 500
     assert len(result.err.splitlines()) == 1 and "500" in result.err
