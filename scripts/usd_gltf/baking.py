@@ -17,7 +17,7 @@ from PIL import Image
 from .pictures import linear_from_srgb
 
 _LEVELS = linear_from_srgb(np.arange(256) / 255.0)
-COARSE = 0.05
+COARSE = 0.1
 """Grain above which a picture is reported as coarser than it was."""
 
 

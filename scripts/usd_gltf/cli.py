@@ -144,6 +144,8 @@ def _run(arguments: argparse.Namespace) -> int:
     exported.document.write(exported.usd)
     _write_report(report_path, text)
     counts = ", ".join(f"{number} {what}" for what, number in sorted(report.counts.items()))
+    if report.notes:
+        counts += f"; {len(report.notes)} notes in {report_path.name}"
     print(f"{output}: written ({counts})")
     return 0
 

@@ -53,6 +53,12 @@ class LightAttributes:
         """The names, other than `inputs:`, whose values are used or known to be overruled."""
         self._found = {name: self._find(name) for name in FALLBACKS}
 
+    @property
+    def names(self) -> set[str]:
+        """All attributes that are read here, or known to be overruled."""
+        everywhere = {f"inputs:{name}" for name in FALLBACKS if name not in _OF_THE_SCHEMA}
+        return self.used | everywhere
+
     def attribute(self, name: str) -> Usd.Attribute | None:
         """The attribute that gives the input `name` its value."""
         return self._found[name]
@@ -116,7 +122,9 @@ class LightAttributes:
         # A Sphere that is a mesh light has a `radius` of its own.
         geometric = name in self.prim.GetPrimDefinition().GetPropertyNames()
         others = [] if geometric else [self.prim.GetAttribute(name)]
-        if name in _ARNOLD:
+        # A dome has nothing to be normalized by.
+        is_dome = str(self.prim.GetTypeName()).startswith("DomeLight")
+        if name in _ARNOLD and not (is_dome and name == "normalize"):
             others += [self.prim.GetAttribute(arnold) for arnold in arnold_names(_ARNOLD[name])]
         others = [attribute for attribute in others if attribute and attribute.HasAuthoredValue()]
         authored = own if own and own.HasAuthoredValue() else None

@@ -93,7 +93,7 @@ class LightCarriers:
             nits = nits * factor
             if not np.any(factor):
                 return
-        nits = self._writable(light, nits)
+        nits = _settled(self._writable(light, nits))
         if light.is_point:
             self._punctual(light, node, extras, _times(nits, area * (self.square_metres / 4)))
             return
@@ -171,7 +171,7 @@ class LightCarriers:
             area = _each_frame(world, mesh.area)
             if np.max(area) <= 0.0:
                 self.report.warn(light.path, f"{light.type} emits nothing", "it has no area")
-            rgb = self._writable(light, self._normalized(light.rgb, light.normalize, area))
+            rgb = _settled(self._writable(light, self._normalized(light.rgb, light.normalize, area)))
         if rgb.ndim == 2 and len({piece.glow for piece in mesh.pieces_lit(light.material_sync)}) > 1:
             why = "its parts glow differently; the first frame's values are used"
             self.report.warn(light.path, "animated light on a mesh of several materials", why)
@@ -185,6 +185,7 @@ class LightCarriers:
 
     def _punctual(self, light: Light, node: dict, extras: dict, candela: np.ndarray) -> None:
         """A point, or a spot if the light is shaped."""
+        candela = _settled(candela)
         self._animated(extras, candela)
         shaping = extras.get("shaping")
         if shaping is None:
@@ -201,7 +202,7 @@ class LightCarriers:
     def _distant(self, light: Light, node: dict, extras: dict) -> None:
         """Lux on a surface that faces it; the angle of the first frame, the lux of every frame."""
         facing = np.vectorize(_facing)(light.angle_deg, light.normalize)
-        lux = _times(light.rgb, facing)
+        lux = _settled(_times(light.rgb, facing))
         extras["angle"] = number(light.angle_deg.flat[0])
         if light.angle_deg.ndim:
             why = "the first frame's is kept; every frame has its own illuminance"
@@ -216,7 +217,7 @@ class LightCarriers:
         rgb = light.rgb
         if light.texture is not None:
             uri, factor = self.pictures.dome(light)
-            rgb = self._writable(light, rgb * factor)
+            rgb = _settled(self._writable(light, rgb * factor))
             if uri is not None:
                 extras["texture"] = uri
         extras["radiance"] = numbers(_first(rgb))
@@ -270,6 +271,11 @@ def _times(rgb: np.ndarray, factor) -> np.ndarray:
     """rgb, (3,) or (frames, 3), times a number or one number for each frame."""
     factor = np.asarray(factor, dtype=float)
     return rgb * (factor[..., None] if factor.ndim else factor)
+
+
+def _settled(rgb: np.ndarray) -> np.ndarray:
+    """One row for (frames, 3) whose rows differ by no more than single precision's noise."""
+    return rgb[0] if rgb.ndim == 2 and np.allclose(rgb, rgb[0], rtol=1e-6, atol=0) else rgb
 
 
 def _first(rgb: np.ndarray) -> np.ndarray:

@@ -127,7 +127,7 @@ def read_light(prim: Usd.Prim, kind: str, frames: Frames, report: Notebook) -> L
         up = prim.GetStage().GetMetadata("upAxis")
         light.pole_z = pole == "Z" or (pole == "scene" and up == "Z")
     report_losses(inputs)
-    read = inputs.used | light_visibility.NAMES | {"filters", "treatAsPoint", "treatAsLine"}
+    read = inputs.names | light_visibility.NAMES | {"filters", "treatAsPoint", "treatAsLine"}
     report_others(prim, read, frames.first, report)
     return light
 

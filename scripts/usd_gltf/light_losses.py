@@ -21,7 +21,7 @@ def _multipliers(inputs: LightAttributes) -> None:
         return
     why = f"multipliers have no carrier; the whole light is carried {diffuse:g} times as bright"
     if specular != diffuse:
-        why += f", so its highlights are that and not {specular:g} times as bright"
+        why += f", highlights too, which should be {specular:g} times as bright"
     name = "diffuse" if diffuse != 1.0 or inputs.varies("diffuse") else "specular"
     inputs.report.warn(inputs.path, f"inputs:{name}", why)
 

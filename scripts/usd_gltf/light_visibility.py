@@ -9,7 +9,7 @@ UsdLux says nothing of it. What is authored becomes `extras.usdLux.visibility`
 | `inputs:visibility:camera` | camera | Houdini's light mixer and others |
 | `primvars:arnold:camera` | camera: a weight of 0 hides it | Arnold's light parameters |
 | `primvars:arnold:visibility:camera`, `:specular_reflect`, `:shadow` | camera, reflections, shadows | Arnold's shape visibility |
-| `primvars:arnold:visibility` | a mask: 1 camera, 2 shadow, 64 specular reflection | AI_RAY_* |
+| `primvars:arnold:visibility` | a mask, what is not in it: 1 camera, 2 shadow, 64 specular reflection | AI_RAY_* |
 | `primvars:ri:attributes:visibility:camera`, `:indirect`, `:transmission` | camera, reflections, shadows | RenderMan |
 | `karma:light:renderlightgeo` | camera | Karma, hdOSPRay |
 | `primvars:karma:object:rendervisibility` | a pattern over primary, reflect, shadow | Karma |
@@ -56,13 +56,16 @@ NAMES = frozenset([name for name, _ in _FLAGS]) | {*_MASKS, *_PATTERNS}
 def read_visibility(prim: Usd.Prim, code: float, report: Notebook) -> dict[str, bool]:
     """`camera`, `reflections` and `shadows`, each only if an attribute says so."""
     found: dict[str, tuple[bool, str]] = {}
+    said: dict[str, list[str]] = {}
     for kind, seen, source in _statements(prim, code, report):
         if kind not in found:
             found[kind] = seen, source
-            report.note(prim.GetPath(), f"{source} = {_value(prim, source, code)}", f"visibility.{kind} is {seen}")
+            said.setdefault(source, []).append(f"visibility.{kind} is {seen}")
         elif found[kind][0] != seen:
             why = f"{found[kind][1]} says {found[kind][0]} of visibility.{kind}, which is used"
             report.warn(prim.GetPath(), f"{source} overruled", why)
+    for source, meanings in said.items():
+        report.note(prim.GetPath(), f"{source} = {_value(prim, source, code)}", ", ".join(meanings))
     return {kind: seen for kind, (seen, _) in found.items()}
 
 
@@ -81,11 +84,12 @@ def _statements(prim: Usd.Prim, code: float, report: Notebook):
     for name in _MASKS:
         mask = _value(prim, name, code)
         if isinstance(mask, int):
-            yield from ((kind, bool(mask & bit), name) for kind, bit in _BITS.items())
+            yield from ((kind, False, name) for kind, bit in _BITS.items() if not mask & bit)
     for name in _PATTERNS:
         pattern = _value(prim, name, code)
         if isinstance(pattern, str):
-            yield from ((kind, _matches(pattern, ray), name) for kind, ray in _KARMA_RAYS.items())
+            said = ((kind, _matches(pattern, ray)) for kind, ray in _KARMA_RAYS.items())
+            yield from ((kind, seen, name) for kind, seen in said if seen is not None)
 
 
 def _value(prim: Usd.Prim, name: str, code: float):
@@ -104,13 +108,16 @@ def _weight(value) -> float | None:
         return None
 
 
-def _matches(pattern: str, ray: str) -> bool:
-    """Karma's pattern: `*`, or rays that see it; `-ray` or `^ray` takes one away. Empty hides it."""
+def _matches(pattern: str, ray: str) -> bool | None:
+    """What Karma's pattern says of a ray: `*`, or the rays that see it; `-ray` or `^ray` takes one
+    away, and an empty pattern all. None if it is only among `*`: that is the default."""
     words = [word for word in re.split(r"[\s|&,]+", pattern) if word]
-    seen = bool(words) and words[0][0] in "-^"
+    seen = None if words and words[0][0] in "-^" else False
     for word in words:
         if word[0] in "-^":
-            seen = seen and word[1:] != ray
-        else:
-            seen = seen or word in ("*", ray)
+            seen = False if word[1:] in ("*", ray) else seen
+        elif word == "*":
+            seen = None
+        elif word == ray:
+            seen = True
     return seen

@@ -54,7 +54,7 @@ class NodeWriter:
         """The node of a prim that stands under the world matrices `above`."""
         world = (prim.local if prim.resets else above @ prim.local) if prim.lit else above
         if prim.local.ndim == 3:
-            node, outer = self._moving(path, prim.name, prim.local, prim.lit)
+            node, outer = self._moving(path, prim.name, prim.local)
         else:
             if id(prim) not in self._still:
                 self._still[id(prim)] = _still(prim.local)
@@ -102,7 +102,7 @@ class NodeWriter:
             name = f"{path}[{number}]"
             matrix = matrices[:, position] if moving else matrices[position]
             if moving:
-                node, outer = self._moving(name, prototype.name, matrix, prototype.lit)
+                node, outer = self._moving(name, prototype.name, matrix)
             elif static[3][position] > SHEAR_TOLERANCE:
                 node, outer = self._placed(name, prototype.name, *_still(matrix))
             else:
@@ -120,32 +120,36 @@ class NodeWriter:
             return node, index
         return node, self.document.node({"name": f"{name}_shear", "children": [index], **outside})
 
-    def _moving(self, path: str, name: str, local: np.ndarray, lit: bool) -> tuple[dict, int]:
-        """A node that follows `local` (frames, 4, 4), and its index."""
-        translation, rotation, scale, shear = decompose(local)
-        if shear.max() > SHEAR_TOLERANCE:
-            why = "translation, rotation and scale cannot hold it over time; the nearest ones are used"
-            report = self.report.about("lights") if lit else self.report
-            report.warn(path, "animated shear", why)
-        node = {"name": name, "extras": {"usdPath": path}, **_place(translation[0], rotation[0], scale[0])}
+    def _moving(self, path: str, name: str, local: np.ndarray) -> tuple[dict, int]:
+        """A node that follows `local` (frames, 4, 4), and the index of the node to hang under the
+        parent. Shear takes two nodes, and is exact at every frame."""
+        sheared = decompose(local)[3].max() > SHEAR_TOLERANCE
+        outside, inside = split_shear(local) if sheared else (None, local)
+        node = {"name": name, "extras": {"usdPath": path}}
+        index = self._following(node, inside)
+        if outside is None:
+            return node, index
+        return node, self._following({"name": f"{name}_shear", "children": [index]}, outside)
+
+    def _following(self, node: dict, local: np.ndarray) -> int:
+        """Index of `node`, made to follow matrices without shear."""
+        translation, rotation, scale, _ = decompose(local)
+        node.update(_place(translation[0], rotation[0], scale[0]))
         index = self.document.node(node)
         tracks = {"translation": translation, "rotation": rotation, "scale": scale}
         for key, values in tracks.items():
             if varies(values):
                 node.setdefault(key, list(_DEFAULTS[key]))
         self.report.count("animation channels", animate(self.document, index, self.frames.seconds, tracks))
-        return node, index
+        return index
 
 
 def _still(local: np.ndarray) -> tuple[dict, dict | None]:
-    """Node properties that hold a matrix; a second set, for a node around it, if it has shear.
-
-    One node cannot hold shear, but two can: a rotated scale around a rotation.
-    """
+    """Node properties that hold a matrix; a second set, for a node around it, if it has shear."""
     translation, rotation, scale, shear = decompose(local[None])
     if shear[0] <= SHEAR_TOLERANCE:
         return _place(translation[0], rotation[0], scale[0]), None
-    outer, inner = (decompose(matrix[None]) for matrix in split_shear(local))
+    outer, inner = (decompose(matrix) for matrix in split_shear(local[None]))
     return _place(*(part[0] for part in inner[:3])), _place(*(part[0] for part in outer[:3]))
 
 

@@ -63,12 +63,13 @@ def decode(data: bytes) -> Picture:
 
 def shape(data: bytes) -> tuple[tuple[int, int], bool] | None:
     """Width and height, and whether it is a cube map, of an OpenEXR (which is refused if it has no
-    plain colour), PNG or JPEG; None for others."""
+    colour that can be read), PNG or JPEG; None for others."""
     if kind(data) == "EXR":
         parts = _exr_parts(data, header_only=True)
         header = next((part.header for part in parts if _colour_names(part.header)), None)
         if header is None:
             raise _no_colour(parts)
+        _to_rec709(header.get("chromaticities"))
         return _window(header, "displayWindow")[1], _is_cube(header)
     if kind(data) in ("PNG", "JPEG"):
         try:

@@ -62,8 +62,16 @@ class Report:
         return json.dumps(body, indent=1, ensure_ascii=False) + "\n"
 
     def summary(self) -> list[str]:
-        """One line for each kind of warning or note, with its count and its first prim."""
-        return _grouped("warning", self.warnings) + _grouped("note", self.notes)
+        """One line for each kind of warning, with its count and its first prim."""
+        groups: dict[tuple[str, str], list[dict[str, str]]] = {}
+        for line in self.warnings:
+            groups.setdefault((line["category"], line["what"]), []).append(line)
+        printed = []
+        for (category, what), group in sorted(groups.items()):
+            first = group[0]
+            times = f" ({len(group)} prims)" if len(group) > 1 else ""
+            printed.append(f"warning: {category}: {what}{times}: {first['path']}: {first['why']}")
+        return printed
 
 
 class Notebook:
@@ -88,15 +96,3 @@ class Notebook:
     def count(self, what: str, by: int = 1) -> None:
         """Add to a count of exported things."""
         self._report.counts[what] += by
-
-
-def _grouped(label: str, lines: list[dict[str, str]]) -> list[str]:
-    groups: dict[tuple[str, str], list[dict[str, str]]] = {}
-    for line in lines:
-        groups.setdefault((line["category"], line["what"]), []).append(line)
-    printed = []
-    for (category, what), group in sorted(groups.items()):
-        first = group[0]
-        times = f" ({len(group)} prims)" if len(group) > 1 else ""
-        printed.append(f"{label}: {category}: {what}{times}: {first['path']}: {first['why']}")
-    return printed

@@ -7,7 +7,7 @@ a warning.
 
 from __future__ import annotations
 
-from pxr import Usd
+from pxr import Sdf, Usd
 
 from .primvars import as_rows
 from .report import Notebook
@@ -58,8 +58,12 @@ def _is_idle(words: list[str], value) -> bool:
     """Whether an attribute does not change the picture."""
     if words[0] in _TOOLS or words[-1] in _SAMPLING or words[-1] in ("dcc_name", "maya_full_name"):
         return True
-    if value is None or value == [] or value == "":
+    if value is None or value == [] or value == "" or (isinstance(value, Sdf.AssetPath) and not value.path):
         return True
+    if words[-1].startswith("barndoor") and value == 0:
+        return True
+    if words == ["arnold", "normalize"] and isinstance(value, bool):
+        return True  # read elsewhere, but on a dome
     return words[0] == "arnold" and len(words) == 2 and words[1] in _NEUTRAL and _same(value, _NEUTRAL[words[1]])
 
 

@@ -285,18 +285,23 @@ def test_shear_is_carried_exactly_by_two_nodes(gltf):
     assert scene.world("/S") == pytest.approx(expected, abs=1e-6)
 
 
-def test_animated_shear_is_reported(export):
-    result = export(
-        ANIMATED
-        + """def Cube "S" {
-            matrix4d xformOp:transform.timeSamples = {
-                1: ((1, 0, 0, 0), (0.5, 1, 0, 0), (0, 0, 1, 0), (0, 0, 0, 1)),
-                2: ((1, 0, 0, 0), (0.9, 1, 0, 0), (0, 0, 1, 0), (0, 0, 0, 1)),
-            }
-            uniform token[] xformOpOrder = ["xformOp:transform"]
-        }"""
+def test_animated_shear_is_exact_at_every_frame(gltf):
+    """A direction goes through the matrix, also below a moving, unevenly scaled rig."""
+    rows = {1: (0.5, 1, 0.2), 2: (0.9, 1.4, -0.3), 3: (-0.6, 0.4, 0), 4: (0, 1, 0), 5: (2, 1, 1)}
+    samples = ", ".join(
+        f"{code}: ((1, 0, 0, 0), ({a}, {b}, {c}, 0), (0, 0.3, -2, 0), ({code}, 4, 5, 1))" for code, (a, b, c) in rows.items()
     )
-    assert "animated shear" in result.warned()
+    scene = gltf(
+        ANIMATED
+        + f"""def Xform "Rig" {{
+            matrix4d xformOp:transform.timeSamples = {{ {samples} }}
+            uniform token[] xformOpOrder = ["xformOp:transform"]
+            def DistantLight "Sun" {{}}
+        }}"""
+    )
+    for code, (a, b, c) in rows.items():
+        expected = np.array([[1, a, 0, code], [0, b, 0.3, 4], [0, c, -2, 5], [0, 0, 0, 1]])
+        assert scene.world("/Rig/Sun", (code - 1) / 24) == pytest.approx(expected, abs=1e-5)
 
 
 def test_reset_xform_stack(gltf):
