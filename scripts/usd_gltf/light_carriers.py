@@ -24,7 +24,7 @@ from .light_inputs import SIZES, Light
 from .light_shapes import Tessellation, tessellate, world_area
 from .light_textures import LightTextures
 from .materials import Emission, Materials
-from .mesh import MeshSource
+from .mesh import GLOW, MeshSource
 from .report import Notebook
 from .stage import Frames
 
@@ -176,6 +176,8 @@ class LightCarriers:
             why = "its parts glow differently; the first frame's values are used"
             self.report.warn(light.path, "animated light on a mesh of several materials", why)
             rgb = rgb[0]
+        if light.material_sync == GLOW:
+            mesh.report_still_glow(self.report)
         lit = mesh.lit_primitives(self.materials, light, rgb)
         if rgb.ndim == 2 and lit:
             self._animated(extras, rgb * np.array(mesh.pieces_lit(light.material_sync)[0].glow))

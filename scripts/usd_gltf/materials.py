@@ -42,6 +42,8 @@ class Look:
     normal_texture: dict | None = None
     occlusion_texture: dict | None = None
     emission: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    emission_keys: np.ndarray | None = None
+    """(frames, 3) nits, if the glow is animated; `emission` is the first frame's."""
     emission_texture: dict | None = None
     alpha_mode: str = "OPAQUE"
     alpha_cutoff: float = 0.5

@@ -68,6 +68,21 @@ class MeshSource:
         """glTF primitives of a mesh that is no light."""
         return [{**piece.primitive, "material": materials.index(piece)} for piece in self.pieces]
 
+    def glow_keys(self) -> np.ndarray | None:
+        """(frames, 3) nits of a mesh whose glow is animated, and the same in all its pieces."""
+        first = self.pieces[0].look.emission_keys
+        same = all(piece.look.emission_keys is not None for piece in self.pieces) and all(
+            np.array_equal(piece.look.emission_keys, first) for piece in self.pieces
+        )
+        return first if same else None
+
+    def report_still_glow(self, report: Notebook) -> None:
+        """Say which materials have an animated glow whose first frame is used."""
+        for look in (piece.look for piece in self.pieces):
+            if look.emission_keys is not None:
+                why = "one node carries one animation for all parts of a mesh; the first frame is used"
+                report.warn(look.path, "animated emissiveColor", why)
+
     def pieces_lit(self, material_sync: str) -> list[Glow]:
         """How each piece glows under `light:materialSyncMode`."""
         white = Glow((1.0, 1.0, 1.0), None)

@@ -78,6 +78,12 @@ class NodeWriter:
             self.carriers.carry(prim.light, node, world, prim.mesh)
         elif prim.mesh is not None:
             node["mesh"] = self._mesh(prim.mesh)
+            keys = prim.mesh.glow_keys()
+            if keys is not None:
+                values = {"times": numbers(self.frames.seconds), "rgb": [numbers(row) for row in keys]}
+                node["extras"]["usdLux"] = {"type": "MeshLight", "inputs": {}, "values": values}
+            else:
+                prim.mesh.report_still_glow(self.report.about("lights"))
         children = [self._prim(child, path + child.path[len(prim.path) :], world) for child in prim.children]
         for prototype, placements in prim.instances:
             children += self._instances(prototype, placements, path, world)

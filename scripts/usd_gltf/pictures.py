@@ -65,12 +65,9 @@ def shape(data: bytes) -> tuple[tuple[int, int], bool] | None:
     """Width and height, and whether it is a cube map, of an OpenEXR (which is refused if it has no
     colour that can be read), PNG or JPEG; None for others."""
     if kind(data) == "EXR":
-        parts = _exr_parts(data, header_only=True)
-        header = next((part.header for part in parts if _colour_names(part.header)), None)
-        if header is None:
-            raise _no_colour(parts)
-        _to_rec709(header.get("chromaticities"))
-        return _window(header, "displayWindow")[1], _is_cube(header)
+        part, _ = _colours(_exr_parts(data, header_only=True))
+        _to_rec709(part.header.get("chromaticities"))
+        return _window(part.header, "displayWindow")[1], _is_cube(part.header)
     if kind(data) in ("PNG", "JPEG"):
         try:
             with Image.open(io.BytesIO(data)) as image:
@@ -132,13 +129,8 @@ def _light(texels: np.ndarray) -> np.ndarray:
 
 
 def _exr(data: bytes) -> Picture:
-    _exr_parts(data, header_only=True)
-    parts = _exr_parts(data, header_only=False)
-    for part in parts:
-        names = _colour_names(part.header)
-        if names:
-            return _placed(part, names)
-    raise _no_colour(parts)
+    _colours(_exr_parts(data, header_only=True))
+    return _placed(*_colours(_exr_parts(data, header_only=False)))
 
 
 def _exr_parts(data: bytes, header_only: bool) -> list:
@@ -158,29 +150,37 @@ def _exr_parts(data: bytes, header_only: bool) -> list:
         os.unlink(path)
 
 
-def _colour_names(header: dict) -> list[str] | None:
-    """The channels of red, green, blue and perhaps alpha; None if there is no plain colour."""
-    channels = {channel.name: channel for channel in header["channels"]}
-    if "deep" in str(header.get("type")):
+def _colours(parts: list) -> tuple:
+    """The first part with R, G and B, else with Y, else with one channel beside alpha; and the names
+    of its red, green, blue and perhaps alpha."""
+    channels = [{channel.name: channel for channel in part.header["channels"]} for part in parts]
+    if any("deep" in str(part.header.get("type")) for part in parts):
         raise PictureError("it is a deep picture; save it as flat RGB")
-    alpha = ["A"] if "A" in channels else []
-    colour = [name for name in channels if name != "A"]
-    if {"RY", "BY"} & channels.keys():
+    if any({"RY", "BY"} & names.keys() for names in channels):
         raise PictureError("it stores luminance and chroma; save it as flat RGB")
-    if {"R", "G", "B"} <= channels.keys():
-        names = ["R", "G", "B", *alpha]
-    elif "Y" in channels or len(colour) == 1:
-        names = ["Y" if "Y" in channels else colour[0]] * 3 + alpha
-    else:
-        return None
-    if any(channels[name].xSampling != 1 or channels[name].ySampling != 1 for name in names):
-        raise PictureError("its channels are of different resolutions; save it as flat RGB")
-    return names
+    for suits in (_rgb, _grey, _lone):
+        for part, names in zip(parts, channels, strict=True):
+            found = suits(names)
+            if found:
+                found += ["A"] if "A" in names else []
+                if any(names[name].xSampling != 1 or names[name].ySampling != 1 for name in found):
+                    raise PictureError("its channels are of different resolutions; save it as flat RGB")
+                return part, found
+    listed = ", ".join(sorted(name for names in channels for name in names))
+    raise PictureError(f"it has no plain R, G, B or Y (its channels: {listed}); save it as flat RGB")
 
 
-def _no_colour(parts: list) -> PictureError:
-    names = sorted(channel.name for part in parts for channel in part.header["channels"])
-    return PictureError(f"it has no plain R, G, B or Y (its channels: {', '.join(names)}); save it as flat RGB")
+def _rgb(names) -> list[str]:
+    return ["R", "G", "B"] if {"R", "G", "B"} <= set(names) else []
+
+
+def _grey(names) -> list[str]:
+    return ["Y"] * 3 if "Y" in names else []
+
+
+def _lone(names) -> list[str]:
+    colour = [name for name in names if name != "A"]
+    return colour * 3 if len(colour) == 1 else []
 
 
 def _is_cube(header: dict) -> bool:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+import numpy as np
 from pxr import Sdf, UsdShade
 
 from .gltf_document import number, numbers
@@ -29,6 +30,8 @@ class Value:
     constant: object = None
     texture: TextureRead | None = None
     display_color: bool = False
+    varies: bool = False
+    """Whether `constant` is a list of one value for each frame."""
 
 
 class PreviewSurfaces:
@@ -157,7 +160,10 @@ class PreviewSurfaces:
         emissive = read["emissiveColor"]
         texture = emissive.texture
         if texture is None:
-            look.emission = self._color(emissive, (0.0, 0.0, 0.0), limit=math.inf)
+            keys = emissive.constant if emissive.varies else [emissive.constant]
+            rows = [self._color(Value(key), (0.0, 0.0, 0.0), limit=math.inf) for key in keys]
+            look.emission = rows[0]
+            look.emission_keys = np.array(rows) if emissive.varies else None
             return
         if texture.is_plain("rgb", srgb=True) and min(texture.scale[:3]) >= 0 and "black" not in texture.wraps:
             image = self.textures.plain(texture)
@@ -208,6 +214,8 @@ class PreviewSurfaces:
             return Value()
         attribute = attributes[0]
         if not UsdShade.Output.IsOutput(attribute):
+            if changes(attribute, self.frames) and name == "emissiveColor":
+                return Value([attribute.Get(code) for code in self.frames.codes], varies=True)
             if changes(attribute, self.frames):
                 report.warn(path, f"animated {name}", "materials have no animation; the first frame is used")
             return Value(constant=attribute.Get(self.code))

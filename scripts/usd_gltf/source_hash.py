@@ -105,7 +105,9 @@ def _read_asset(resolved: str) -> bytes | None:
     if not Ar.IsPackageRelativePath(resolved) and os.path.isdir(resolved):
         return None
     asset = Ar.GetResolver().OpenAsset(Ar.ResolvedPath(resolved))
-    return bytes(asset.GetBuffer()) if asset is not None else None
+    if asset is None:
+        return None
+    return bytes(asset.GetBuffer()) if asset.GetSize() else b""
 
 
 def _digest(data: bytes) -> str:
