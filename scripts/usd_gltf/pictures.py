@@ -238,7 +238,8 @@ def _to_xyz(chromaticities) -> np.ndarray | None:
     if not np.isfinite(xy).all() or (xy[:, 1] == 0).any():
         return None
     xyz = np.stack([xy[:, 0] / xy[:, 1], np.ones(4), (1 - xy.sum(axis=1)) / xy[:, 1]])
-    if abs(np.linalg.det(xyz[:, :3])) < 1e-6:
+    volume = abs(np.linalg.det(xyz[:, :3]))
+    if not np.isfinite(volume) or volume < 1e-6:
         return None
     matrix = xyz[:, :3] * np.linalg.solve(xyz[:, :3], xyz[:, 3])
     return matrix if (np.abs(_BRADFORD @ matrix.sum(axis=1)) > 1e-6).all() else None

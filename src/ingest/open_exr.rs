@@ -164,7 +164,8 @@ fn to_xyz(points: [DVec2; 4]) -> Option<DMat3> {
     let [red, green, blue, white] =
         points.map(|at| DVec3::new(at.x / at.y, 1.0, (1.0 - at.x - at.y) / at.y));
     let primaries = DMat3::from_cols(red, green, blue);
-    if !(primaries.determinant().abs() > 1e-6) {
+    let volume = primaries.determinant().abs();
+    if !volume.is_finite() || volume < 1e-6 {
         return None;
     }
     Some(primaries * DMat3::from_diagonal(primaries.inverse() * white))
