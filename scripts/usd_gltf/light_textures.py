@@ -159,7 +159,9 @@ class LightTextures:
             raise PictureError("it is a cube map; save it as latitude and longitude")
         if dome and abs(size[0] - 2 * size[1]) > 0.02 * size[0]:
             why = f"{file.name} is {size[0]} x {size[1]}; it is read as latitude and longitude all the same"
-            self.report.warn(light.path, "dome picture that is not twice as wide as high", why)
+            is_cross = 3 * size[0] == 4 * size[1] or 4 * size[0] == 3 * size[1]
+            line = self.report.warn if is_cross else self.report.note
+            line(light.path, "dome picture that is not twice as wide as high", why)
 
     def _unreadable(self, light: Light, name: str, error: PictureError) -> None:
         self.report.warn(light.path, "picture of a light that cannot be read", f"{name}: {error}; {_DARK}")

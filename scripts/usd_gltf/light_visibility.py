@@ -73,13 +73,15 @@ def _statements(prim: Usd.Prim, code: float, report: Notebook):
     """(kind, seen, attribute) for all that the prim's attributes say, in the order of the table."""
     for name, kind in _FLAGS:
         value = _value(prim, name, code)
+        if value == "use default" or (name.startswith("moonray:") and value == 2):
+            continue  # MoonRay's word for it, and its number
         weight = _weight(value)
         if weight is not None:
             if 0 < weight < 1:
                 why = f"a visibility of {weight:g} has no carrier; the light is fully visible"
                 report.warn(prim.GetPath(), f"{name} between 0 and 1", why)
             yield kind, weight > 0, name
-        elif value is not None and value != "use default":
+        elif value is not None:
             report.warn(prim.GetPath(), f"{name} of a wrong type", f"it is {value!r}; it is ignored")
     for name in _MASKS:
         mask = _value(prim, name, code)

@@ -14,6 +14,8 @@ from .report import Notebook
 
 _TOOLS = ("houdini", "userProperties", "nodeHandle", "maya", "blender", "omni")
 """Namespaces of tools that keep their own notes on a prim."""
+_NOT_OURS = ("xformOp:", "collection:", "candelabra:", "material:", "skel:", "primvars:skel:", "physics:")
+"""What USD's other schemas say of a prim, applied or not."""
 _SAMPLING = (
     "samples", "volume_samples", "aov", "aov_indirect", "name", "id", "resolution", "motion_start",
     "motion_end", "matrix", "light_group", "camera_samples", "label", "lightGroup", "lightgroup",
@@ -38,7 +40,7 @@ def report_others(prim: Usd.Prim, known: set[str], code: float, report: Notebook
     lines: dict[tuple[str, bool], list[str]] = {}
     for property_ in prim.GetAuthoredProperties():
         name = property_.GetName()
-        if name in known or name.startswith(("xformOp:", "collection:", "candelabra:")):
+        if name in known or name.startswith(_NOT_OURS):
             continue
         words = name.removeprefix("primvars:").removeprefix("inputs:").split(":")
         if len(words) == 1 and name.startswith("primvars:") and prim.HasAttribute("faceVertexCounts"):

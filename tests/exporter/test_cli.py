@@ -126,6 +126,12 @@ def test_strict_by_category(export, category):
     assert export(text, f"--strict={others},{category}").code == 1
 
 
+@pytest.mark.parametrize("scene", sorted(p.stem for p in (ROOT / "scenes").glob("*/*.usda") if p.stem == p.parent.name))
+def test_the_projects_own_scenes_pass_strict(export, scene):
+    result = export(ROOT / "scenes" / scene / f"{scene}.usda", "--strict")
+    assert result.code == 0, result.err
+
+
 def test_strict_never_takes_the_word_after_it(export, tmp_path):
     (tmp_path / "scene.usda").write_text("#usda 1.0\n")
     command = [sys.executable, str(ROOT / "scripts" / "usd_to_gltf.py"), "--strict", "scene.usda", "out.glb"]

@@ -149,6 +149,13 @@ def test_a_meshs_own_primvars_and_schema_say_nothing(export):
             point3f[] points = [(0, 0, 0), (1, 0, 0), (0, 1, 0)]
             uniform token subdivisionScheme = "none"
             texCoord2f[] primvars:UVMap = [(0, 0), (1, 0), (1, 1)] (interpolation = "vertex")
+            rel material:binding = </Mat>
+        }
+        def Material "Mat" {
+            token outputs:surface.connect = </Mat/S.outputs:surface>
+            def Shader "S" { uniform token info:id = "UsdPreviewSurface"
+                color3f inputs:emissiveColor = (1, 1, 1)
+                token outputs:surface }
         }
         def Sphere "S" (prepend apiSchemas = ["MeshLightAPI"]) { double radius = 3 }""",
         "--strict",
@@ -270,6 +277,8 @@ SEEN = [
     ('string primvars:karma:object:rendervisibility = "*"', {}),
     ('token moonray:visible_in_camera = "force off"', {"camera": False}),
     ('token moonray:visible_in_camera = "use default"', {}),
+    ("int moonray:visible_in_camera = 2", {}),
+    ("int moonray:visible_in_camera = 0", {"camera": False}),
     ("bool ospray:visibleToCamera = 1", {"camera": True}),
     ("bool primvars:cycles:object:visibility:glossy = 0", {"reflections": False}),
 ]

@@ -184,10 +184,12 @@ def test_domes_of_other_layouts_are_dark_and_say_so(export, tmp_path, layout, pr
     assert Gltf(result.path).lux("/L")["radiance"] == [0, 0, 0]
 
 
-def test_a_dome_picture_of_odd_shape_is_reported(export, tmp_path):
-    Image.new("RGB", (6, 8), (255, 0, 0)).save(tmp_path / "p.png")
+@pytest.mark.parametrize(("size", "crossed"), [((6, 8), True), ((8, 6), True), ((8, 8), False), ((8, 4), None)])
+def test_a_dome_picture_of_odd_shape_is_listed_and_a_cross_warned_of(export, tmp_path, size, crossed):
+    Image.new("RGB", size, (255, 0, 0)).save(tmp_path / "p.png")
     result = export('def DomeLight "L" { asset inputs:texture:file = @p.png@ }')
-    assert "dome picture that is not twice as wide as high" in result.warned("lights")
+    what = "dome picture that is not twice as wide as high"
+    assert (what in result.warned("lights"), what in result.noted()) == (crossed is True, crossed is False)
 
 
 # -- sequences, surfaces that glow, tiles ------------------------------------------------------------
