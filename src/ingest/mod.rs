@@ -23,6 +23,7 @@ mod image;
 mod normals;
 mod notes;
 mod obj;
+mod open_exr;
 mod paths;
 mod uri;
 
