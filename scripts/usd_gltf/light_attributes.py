@@ -138,7 +138,7 @@ class LightAttributes:
                     if old
                     else f"it is read as inputs:{name}, which is not authored"
                 )
-                self.report.warn(self.path, f"old attribute {name}" if old else other.GetName(), why)
+                self.report.note(self.path, f"old attribute {name}" if old else other.GetName(), why)
             elif other.Get(self.frames.first) != authored.Get(self.frames.first):
                 why = f"it is {other.Get(self.frames.first)}, but {authored.GetName()} is "
                 why += f"{authored.Get(self.frames.first)}, which is used"

@@ -62,15 +62,16 @@ class Report:
         return json.dumps(body, indent=1, ensure_ascii=False) + "\n"
 
     def summary(self) -> list[str]:
-        """One line for each kind of warning, with its count and its first prim."""
-        groups: dict[tuple[str, str], list[dict[str, str]]] = {}
-        for line in self.warnings:
-            groups.setdefault((line["category"], line["what"]), []).append(line)
+        """One line for each kind of warning and note, with its count and its first prim."""
         printed = []
-        for (category, what), group in sorted(groups.items()):
-            first = group[0]
-            times = f" ({len(group)} prims)" if len(group) > 1 else ""
-            printed.append(f"warning: {category}: {what}{times}: {first['path']}: {first['why']}")
+        for name, lines in (("warning", self.warnings), ("note", self.notes)):
+            groups: dict[tuple[str, str], list[dict[str, str]]] = {}
+            for line in lines:
+                groups.setdefault((line["category"], line["what"]), []).append(line)
+            for (category, what), group in sorted(groups.items()):
+                first = group[0]
+                times = f" ({len(group)} prims)" if len(group) > 1 else ""
+                printed.append(f"{name}: {category}: {what}{times}: {first['path']}: {first['why']}")
         return printed
 
 
