@@ -11,8 +11,9 @@ use super::triangle::WorldTriangle;
 use crate::bounds::{Aabb, Cone, LightBounds};
 use crate::math::Similarity;
 use crate::math::color::{Rgb, luminance};
+use crate::math::directions::{aim, mirrors};
 use crate::scene::{LightKind, Shaping};
-use glam::{Affine3A, Vec3};
+use glam::{Affine3A, DVec3, Vec3};
 use rayon::prelude::*;
 use std::f32::consts::PI;
 use std::ops::Range;
@@ -93,16 +94,15 @@ impl PosedEmitters<'_> {
         let corners = mesh.triangles[mesh_light.triangle(own) as usize];
         let corners = corners.map(|c| world.transform_point3(mesh.positions[c as usize]));
         let triangle = WorldTriangle { corners };
-        let handedness = 1f32.copysign(world.matrix3.determinant());
+        let handedness = if mirrors(world) { -1.0 } else { 1.0 };
         let double_sided = self.scene.material_of(mesh_light.mesh).is_some_and(|m| m.double_sided);
         let cone = match mesh_light.shaping {
             Some(shaping) if shaping.half_angle_rad() < PI / 2.0 => {
-                let aim = (-Vec3::from(world.matrix3.z_axis)).normalize_or(-Vec3::Z);
-                Cone::spot(aim, shaping.half_angle_rad())
+                Cone::spot(aim(world).as_vec3(), shaping.half_angle_rad())
             }
             _ => {
-                let normal = triangle.area_normal().normalize_or(Vec3::Z) * handedness;
-                Cone::flat(normal, double_sided)
+                let normal = triangle.area_normal().normalize_or(DVec3::Z) * handedness;
+                Cone::flat(normal.as_vec3(), double_sided)
             }
         };
         LightBounds {
@@ -117,7 +117,8 @@ impl PosedEmitters<'_> {
         let light = &self.scene.lights[row as usize];
         let strength = luminance(self.scene.rgb_of_light(row, self.pose));
         let here = Vec3::from(self.pose.world(light.node).translation);
-        let aimed = |shaping: &Shaping| Cone::spot(self.aim(light.node), shaping.half_angle_rad());
+        let aim = self.aim(light.node).as_vec3();
+        let aimed = |shaping: &Shaping| Cone::spot(aim, shaping.half_angle_rad());
         let (radius, cone, energy) = match &light.kind {
             LightKind::Point { .. } => (0.0, Cone::ALL, strength),
             LightKind::Spot { shaping, .. } => (0.0, aimed(shaping), strength),

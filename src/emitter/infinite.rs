@@ -1,10 +1,14 @@
-//! Lights at infinity: suns and domes. They stay outside the boxes of the tree.
+//! Infinite lights: suns and domes. They have no place, so no box of the tree holds them.
+//!
+//! A sun stands where its node aims from: along +Z through the node's matrix as it is, as spots and
+//! cameras have it.
 
-use super::dome::Dome;
+use super::dome::{Dome, DomeSample};
 use crate::math::color::{Rgb, luminance};
+use crate::math::directions::aim;
 use crate::math::{Frame, warp};
 use crate::scene::{LightKind, Pose, Scene};
-use glam::{Quat, Vec2, Vec3};
+use glam::{Vec2, Vec3};
 use std::f32::consts::PI;
 
 /// A light at infinity, in world space.
@@ -43,17 +47,12 @@ pub struct InfiniteSample {
 
 /// The lights of a scene that are at infinity and shine in a pose.
 pub fn infinite_lights<'a>(scene: &'a Scene, pose: &Pose) -> Vec<InfiniteLight<'a>> {
-    let rotation = |node: u32| {
-        // The rotation that remains of a transform without its scale.
-        let (_, rotation, _) = pose.world(node).to_scale_rotation_translation();
-        if rotation.is_finite() { rotation.normalize() } else { Quat::IDENTITY }
-    };
     let kind = |light: &crate::scene::Light, rgb: Rgb| match light.kind {
         LightKind::Distant { angle_rad, .. } if rgb.max_element() > 0.0 => {
             let half_angle_rad = 0.5 * angle_rad.clamp(0.0, 2.0 * PI);
             let sine = (0.5 * half_angle_rad).sin();
             Some(Kind::Sun(Sun {
-                towards: rotation(light.node) * Vec3::Z,
+                towards: -aim(&pose.world(light.node)).as_vec3(),
                 irradiance_lux: rgb,
                 half_angle_rad,
                 one_minus_cos: 2.0 * sine * sine,
@@ -61,7 +60,7 @@ pub fn infinite_lights<'a>(scene: &'a Scene, pose: &Pose) -> Vec<InfiniteLight<'
         }
         LightKind::Dome { texture, .. } if rgb.max_element() > 0.0 => {
             let texture = texture.map(|index| &scene.textures[index as usize]);
-            Some(Kind::Dome(Box::new(Dome::new(rotation(light.node), rgb, texture))))
+            Some(Kind::Dome(Box::new(Dome::new(&pose.world(light.node), rgb, texture))))
         }
         _ => None,
     };
@@ -117,13 +116,8 @@ impl InfiniteLight<'_> {
                 pdf: Some(warp::cone_pdf(sun.one_minus_cos)),
             }),
             Kind::Dome(dome) => {
-                let sample = dome.sample(normal, u)?;
-                let radiance = dome.radiance(sample.direction);
-                Some(InfiniteSample {
-                    direction: sample.direction,
-                    radiance,
-                    pdf: Some(sample.pdf),
-                })
+                let DomeSample { direction, radiance, pdf } = dome.sample(normal, u)?;
+                Some(InfiniteSample { direction, radiance, pdf: Some(pdf) })
             }
         }
     }

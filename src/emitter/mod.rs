@@ -13,6 +13,7 @@ mod bounding;
 mod dome;
 mod infinite;
 mod mesh_light;
+mod picture;
 mod posed;
 mod set;
 mod shaping;
