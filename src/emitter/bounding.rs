@@ -1,8 +1,8 @@
-//! The bounds of emitters, which the tree is built over.
+//! The bounds of emitters. The tree is built over them.
 //!
-//! Energy is peak radiant intensity: `I` of a point, `L A` of a triangle, `L pi r^2` of a sphere, in
-//! luminance; never quite zero, so that an emitter which a transform has flattened, or which is dark
-//! in this frame, keeps its place in the tree.
+//! Energy is the luminance of the peak radiant intensity: `I` of a point, `L A` of a triangle,
+//! `L pi r^2` of a sphere. It is never quite zero: an emitter that a transform has flattened, or that
+//! is dark in this frame, keeps its place in the tree.
 
 use super::mesh_light::MeshLight;
 use super::posed::PosedEmitters;
@@ -18,7 +18,7 @@ use rayon::prelude::*;
 use std::f32::consts::PI;
 use std::ops::Range;
 
-/// A light that `f32` cannot hold.
+/// A light whose numbers are too large for `f32`.
 #[derive(Clone, Debug, thiserror::Error, PartialEq, Eq)]
 #[error(
     "{path}: its position or its intensity times its area is beyond the range of numbers (3e38); scale it down"
@@ -70,9 +70,9 @@ impl PosedEmitters<'_> {
         })
     }
 
-    /// Where a mesh light with a tree of its own stands: from world space to its mesh's space; and by
-    /// how much its energy has changed against what that of its own space says. `None` if its
-    /// transform bends shapes.
+    /// Where a mesh light with a tree of its own stands: the map from world space to the space of its
+    /// mesh, and its energy over the energy that the tree holds. `None` if its transform does not keep
+    /// shapes.
     pub fn placing(&self, light: u32) -> Option<(Similarity, f32)> {
         let entry = &self.emitters.lights()[light as usize];
         let LightSource::Mesh { instance: row, mesh_light } = entry.source else { return None };
@@ -135,7 +135,8 @@ impl PosedEmitters<'_> {
         LightBounds { aabb, cone, energy, range_m: light.range_m.unwrap_or(f32::INFINITY) }
     }
 
-    /// The middle of an emitter, world space: what a point in a medium is chosen near to.
+    /// The middle of an emitter, world space. Points in fog are drawn by the angle under which it sees
+    /// them.
     pub fn middle(&self, emitter: u32) -> Vec3 {
         match self.emitters.place_of(emitter) {
             super::EmitterPlace::Triangle { instance, triangle } => {
@@ -150,7 +151,7 @@ impl PosedEmitters<'_> {
     }
 }
 
-/// Bounds that a tree may be built over, if they are.
+/// The bounds, if a tree may be built over them.
 fn sound(mut bounds: LightBounds) -> Option<LightBounds> {
     bounds.energy = bounds.energy.max(f32::MIN_POSITIVE);
     bounds.is_sound().then_some(bounds)

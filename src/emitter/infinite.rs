@@ -11,7 +11,7 @@ use crate::scene::{LightKind, Pose, Scene};
 use glam::{Vec2, Vec3};
 use std::f32::consts::PI;
 
-/// A light at infinity, in world space.
+/// An infinite light, in world space.
 pub struct InfiniteLight<'a> {
     /// Index into [`Scene::lights`].
     pub light: usize,
@@ -34,7 +34,7 @@ struct Sun {
     one_minus_cos: f32,
 }
 
-/// A direction towards a light at infinity.
+/// A direction towards an infinite light.
 #[derive(Clone, Copy, Debug)]
 pub struct InfiniteSample {
     /// Unit, world space.
@@ -45,7 +45,7 @@ pub struct InfiniteSample {
     pub pdf: Option<f32>,
 }
 
-/// The lights of a scene that are at infinity and shine in a pose.
+/// The infinite lights of a scene that shine in a pose.
 pub fn infinite_lights<'a>(scene: &'a Scene, pose: &Pose) -> Vec<InfiniteLight<'a>> {
     let kind = |light: &crate::scene::Light, rgb: Rgb| match light.kind {
         LightKind::Distant { angle_rad, .. } if rgb.max_element() > 0.0 => {
@@ -73,8 +73,8 @@ pub fn infinite_lights<'a>(scene: &'a Scene, pose: &Pose) -> Vec<InfiniteLight<'
 }
 
 impl InfiniteLight<'_> {
-    /// An estimate of the irradiance on a surface with this normal (zero: in any direction), lux;
-    /// 0 only where none arrives. What it competes with against the tree's importance.
+    /// An estimate of the irradiance on a surface with this normal (zero: in any direction), lux. It is 0
+    /// only where no light arrives. It competes with the importance of the tree.
     pub fn importance(&self, normal: Vec3) -> f64 {
         match &self.kind {
             Kind::Sun(sun) => {
@@ -142,6 +142,8 @@ impl InfiniteLight<'_> {
 }
 
 impl Sun {
+    /// Whether the disk is smaller than the steps between directions of 32-bit numbers: below a half
+    /// angle of 1.4e-6 rad. It then has its irradiance, but no ray can be said to hit it.
     fn is_delta(&self) -> bool {
         self.one_minus_cos < 1e-12
     }
@@ -154,7 +156,8 @@ impl Sun {
         self.irradiance_lux / (PI * projected)
     }
 
-    /// Whether a direction points at the disk. Squared chords keep disks of 1e-4 rad exact.
+    /// Whether a direction points at the disk. Squared chords keep their digits in disks of 1e-4 rad,
+    /// where cosines are 1.
     fn contains(&self, direction: Vec3) -> bool {
         !self.is_delta() && (direction - self.towards).length_squared() <= 2.0 * self.one_minus_cos
     }

@@ -1,4 +1,6 @@
-//! The transform hierarchy, and the evaluation of whatever is animated at a time.
+//! The transform hierarchy, and what is animated evaluated at a time.
+//!
+//! A key counts as at a frame's time if it is [meant to be](Timeline::is_same).
 
 use super::{Scene, Timeline};
 use crate::math::color::Rgb;
@@ -67,7 +69,7 @@ pub enum Interpolation {
     Cubic,
 }
 
-/// What varies, at one time: world transforms of all nodes, strengths of the lights that have keys.
+/// Whatever varies, at one time: world transforms of all nodes, strengths of the lights with keys.
 #[derive(Clone, Debug)]
 pub struct Pose {
     world: Vec<Affine3A>,
@@ -104,8 +106,8 @@ impl Pose {
         }
     }
 
-    /// The world-space radius of a sphere of some local radius at a node, metres: it grows with the
-    /// cube root of the volume. What samples a sphere and what hits it must agree to the last bit.
+    /// The world-space radius of a sphere of some local radius at a node, metres. It grows with the
+    /// cube root of the volume. Sampling and intersection both use it: they must agree to the last bit.
     pub fn world_radius(&self, node: u32, radius: f32) -> f32 {
         let volume = self.world(node).matrix3.as_dmat3().determinant().abs();
         (f64::from(radius) * volume.cbrt()) as f32
