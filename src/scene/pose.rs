@@ -1,6 +1,8 @@
-//! The transform hierarchy, and the evaluation of whatever is animated at a time.
+//! The transform hierarchy, and what is animated evaluated at a time.
+//!
+//! A key counts as at a frame's time if it is [meant to be](Timeline::is_same).
 
-use super::Scene;
+use super::{Scene, Timeline};
 use crate::math::color::Rgb;
 use glam::{Affine3A, DAffine3, DQuat, DVec3, Quat, Vec3};
 
@@ -33,7 +35,7 @@ pub enum Trs {
     },
 }
 
-/// One animated part of a node's transform. `times_s` ascends and is not empty.
+/// One animated part of a node's transform.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Channel {
     /// Metres.
@@ -67,7 +69,7 @@ pub enum Interpolation {
     Cubic,
 }
 
-/// What varies, at one time: world transforms of all nodes, strengths of the lights that have keys.
+/// Whatever varies, at one time: world transforms of all nodes, strengths of the lights with keys.
 #[derive(Clone, Debug)]
 pub struct Pose {
     world: Vec<Affine3A>,
@@ -86,9 +88,10 @@ impl Default for Trs {
 impl Pose {
     /// Composes the hierarchy in double precision, so that only the result is rounded.
     pub(super) fn evaluate(scene: &Scene, time_s: f64) -> Pose {
+        let at = Instant { time_s, timeline: scene.timeline };
         let mut exact: Vec<DAffine3> = Vec::with_capacity(scene.nodes.len());
         for node in &scene.nodes {
-            let local = node.local_at(time_s);
+            let local = node.local_at(at);
             exact.push(match node.parent {
                 Some(parent) => exact[parent as usize] * local,
                 None => local,
@@ -98,13 +101,13 @@ impl Pose {
         let instances = scene.instances.iter().map(|instance| instance.values.as_ref());
         Pose {
             world: exact.iter().map(DAffine3::as_affine3a).collect(),
-            light_rgb: values_at(lights, time_s),
-            instance_rgb: values_at(instances, time_s),
+            light_rgb: values_at(lights, at),
+            instance_rgb: values_at(instances, at),
         }
     }
 
-    /// The world-space radius of a sphere of some local radius at a node, metres: it grows with the
-    /// cube root of the volume. What samples a sphere and what hits it must agree to the last bit.
+    /// The world-space radius of a sphere of some local radius at a node, metres. It grows with the
+    /// cube root of the volume. Sampling and intersection both use it: they must agree to the last bit.
     pub fn world_radius(&self, node: u32, radius: f32) -> f32 {
         let volume = self.world(node).matrix3.as_dmat3().determinant().abs();
         (f64::from(radius) * volume.cbrt()) as f32
@@ -132,12 +135,12 @@ impl Pose {
 /// The values of a table at a time; no table if it has no keys.
 fn values_at<'a>(
     rows: impl Iterator<Item = Option<&'a Keys<Rgb>>> + Clone,
-    time_s: f64,
+    at: Instant,
 ) -> Vec<Option<Rgb>> {
     if rows.clone().all(|keys| keys.is_none()) {
         return Vec::new();
     }
-    rows.map(|keys| Some(keys?.vector_at(time_s).as_vec3())).collect()
+    rows.map(|keys| Some(keys?.vector_at(at).as_vec3())).collect()
 }
 
 /// Which nodes move: those with channels, and all below them.
@@ -194,20 +197,27 @@ impl Node {
     }
 
     /// Local to parent at a time.
-    fn local_at(&self, time_s: f64) -> DAffine3 {
+    fn local_at(&self, at: Instant) -> DAffine3 {
         let (mut translation, mut rotation, mut scale) = match self.local {
             Trs::Matrix(matrix) => return matrix,
             Trs::Parts { translation, rotation, scale } => (translation, rotation, scale),
         };
         for channel in &self.channels {
             match channel {
-                Channel::Translation(keys) => translation = keys.vector_at(time_s),
-                Channel::Scale(keys) => scale = keys.vector_at(time_s),
-                Channel::Rotation(keys) => rotation = keys.rotation_at(time_s),
+                Channel::Translation(keys) => translation = keys.vector_at(at),
+                Channel::Scale(keys) => scale = keys.vector_at(at),
+                Channel::Rotation(keys) => rotation = keys.rotation_at(at),
             }
         }
         DAffine3::from_scale_rotation_translation(scale, rotation, translation)
     }
+}
+
+/// A time at which everything is evaluated.
+#[derive(Clone, Copy)]
+struct Instant {
+    time_s: f64,
+    timeline: Timeline,
 }
 
 /// Where a time falls among keys: the two neighbours, the fraction between them, their distance.
@@ -219,16 +229,22 @@ struct Between {
 }
 
 impl<T: Copy> Keys<T> {
-    fn find(&self, time_s: f64) -> Between {
-        let after = self.times_s.partition_point(|&key| f64::from(key) <= time_s);
+    fn find(&self, at: Instant) -> Between {
+        let after = self.times_s.partition_point(|&key| f64::from(key) <= at.time_s);
         let last = self.times_s.len() - 1;
+        let held = |i| Between { before: i, after: i, fraction: 0.0, step_s: 0.0 };
         if after == 0 || after > last {
-            let held = if after == 0 { 0 } else { last };
-            return Between { before: held, after: held, fraction: 0.0, step_s: 0.0 };
+            return held(after.min(last));
         }
-        let (t0, t1) = (f64::from(self.times_s[after - 1]), f64::from(self.times_s[after]));
-        let fraction = (time_s - t0) / (t1 - t0);
-        Between { before: after - 1, after, fraction, step_s: t1 - t0 }
+        let before = after - 1;
+        let [t0, t1] = [before, after].map(|i| f64::from(self.times_s[i]));
+        let (since, step_s) = (at.time_s - t0, t1 - t0);
+        // The nearer key decides whether the time is that of a key.
+        let (nearer, key_s) = if 2.0 * since < step_s { (before, t0) } else { (after, t1) };
+        if at.timeline.is_same(at.time_s, key_s) {
+            return held(nearer);
+        }
+        Between { before, after, fraction: since / step_s, step_s }
     }
 
     /// Hermite weights of (value, out-tangent, value, in-tangent), glTF 2.0 appendix C.
@@ -256,8 +272,8 @@ impl Keys<Vec3> {
         self.values.iter().fold(Vec3::ZERO, |peak, &value| peak.max(value))
     }
 
-    fn vector_at(&self, time_s: f64) -> DVec3 {
-        let at = self.find(time_s);
+    fn vector_at(&self, at: Instant) -> DVec3 {
+        let at = self.find(at);
         match self.interpolation {
             Interpolation::Linear => {
                 let (a, b) = (self.values[at.before].as_dvec3(), self.values[at.after].as_dvec3());
@@ -274,8 +290,8 @@ impl Keys<Vec3> {
 }
 
 impl Keys<Quat> {
-    fn rotation_at(&self, time_s: f64) -> DQuat {
-        let at = self.find(time_s);
+    fn rotation_at(&self, at: Instant) -> DQuat {
+        let at = self.find(at);
         match self.interpolation {
             Interpolation::Linear => {
                 let (a, b) = (self.values[at.before].as_dquat(), self.values[at.after].as_dquat());
