@@ -1,7 +1,7 @@
 //! Folders of shots, compared shot by shot.
 
-use super::{Diff, DiffOptions, Side, SideError, compare};
-use crate::pipeline::is_tree_file;
+use super::{Diff, DiffOptions, Side, SideError, compare, look_at_both};
+use crate::pipeline::{View, is_tree_file};
 use rayon::prelude::*;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -64,12 +64,12 @@ impl FolderDiff {
 }
 
 /// Compares all scenes and tree files (`.ltree`, `.gltf`, `.glb`, `.obj`) of two folders and of the
-/// folders in them, matched by relative path. A shot that cannot be compared does not keep the others
+/// folders in them, matched by relative path, each pair seen as by [`look_at_both`]. A shot that cannot be compared does not keep the others
 /// from it.
 ///
 /// # Errors
 /// A folder that cannot be walked.
-pub fn compare_folders(before: &Path, after: &Path) -> Result<FolderDiff, SideError> {
+pub fn compare_folders(before: &Path, after: &Path, view: &View) -> Result<FolderDiff, SideError> {
     let mut shots: BTreeMap<String, [Option<PathBuf>; 2]> = BTreeMap::new();
     for (side, folder) in [before, after].into_iter().enumerate() {
         for entry in WalkDir::new(folder).follow_links(true) {
@@ -85,7 +85,7 @@ pub fn compare_folders(before: &Path, after: &Path) -> Result<FolderDiff, SideEr
     let shots: Vec<_> = shots.into_iter().collect();
     let shot = |(name, files): &(String, [Option<PathBuf>; 2])| {
         let outcome = match files {
-            [Some(before), Some(after)] => of_both(before, after),
+            [Some(before), Some(after)] => of_both(before, after, view),
             [Some(_), None] => Outcome::Removed,
             [None, _] => Outcome::Added,
         };
@@ -98,9 +98,10 @@ pub fn compare_folders(before: &Path, after: &Path) -> Result<FolderDiff, SideEr
     })
 }
 
-fn of_both(before: &Path, after: &Path) -> Outcome {
-    let compared = Side::open(before).and_then(|before| {
-        let after = Side::open(after)?;
+fn of_both(before: &Path, after: &Path, view: &View) -> Outcome {
+    let compared = Side::open(before).and_then(|mut before| {
+        let mut after = Side::open(after)?;
+        look_at_both(&mut before, &mut after, view)?;
         compare(&before, &after, &DiffOptions::default())
     });
     match compared {

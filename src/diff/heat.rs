@@ -3,7 +3,7 @@
 use super::scene_side::SceneSide;
 use crate::light_tree::LightTree;
 use crate::measure::direct_light;
-use crate::pipeline;
+use crate::pipeline::ASPECT;
 use crate::render::{RenderDelegate, RenderSettings};
 
 /// A coarse picture of direct light before and after: what the first surface behind the middle of each
@@ -41,8 +41,6 @@ impl HeatCell {
 
 /// Cells in a row of a map with room for all.
 const WIDTH: u32 = 96;
-/// Width over height where the camera does not say.
-const ASPECT: f32 = 16.0 / 9.0;
 /// Cells times emitters: what both pictures may take, seconds rather than minutes.
 const MOST_LIGHTINGS: u64 = 1 << 26;
 /// The same with a ray each.
@@ -50,14 +48,13 @@ const MOST_RAYS: u64 = 1 << 23;
 /// Coarser than this says nothing.
 const LEAST_WIDTH: u32 = 16;
 
-/// The map of two scenes, through the first camera of each; `None` if one has none. It is the coarser
+/// The map of two scenes, each through its camera; `None` if one has none. It is the coarser
 /// the more emitters there are.
 pub(super) fn map<D: AsRef<[u8]> + Sync>(
     sides: [&SceneSide; 2],
     trees: [&LightTree<D>; 2],
 ) -> Option<HeatMap> {
-    let camera = |side: &SceneSide| pipeline::find_camera(side.scene, None).ok().cloned();
-    let [Some(before), Some(after)] = sides.map(camera) else { return None };
+    let [Some(before), Some(after)] = sides.map(|side| side.camera.cloned()) else { return None };
     let aspect = after.aspect.unwrap_or(ASPECT);
     let emitters = sides.map(|side| side.emitters.len().max(1)).into_iter().max()? as u64;
     let (width, height) = size(emitters, aspect);

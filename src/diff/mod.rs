@@ -12,6 +12,7 @@
 //! | file | what |
 //! |---|---|
 //! | `side`, `tree_side`, `scene_side` | a version, opened; what a tree tells, what a scene tells |
+//! | `sight` | what both are looked at through |
 //! | `light`, `profile`, `infinite` | a light as it is matched; its texture and shape; suns and domes |
 //! | `matching`, `pairs` | which light is which, renames among them |
 //! | `card`, `describe` | one light, described |
@@ -42,6 +43,7 @@ mod probes;
 mod profile;
 mod scene_side;
 mod side;
+mod sight;
 mod text;
 mod totals;
 mod tree_side;
@@ -54,6 +56,7 @@ pub use heat::{HeatCell, HeatMap};
 pub use html::html;
 pub use picking::{PickingChange, ProbePlaces};
 pub use side::{Side, SideError};
+pub use sight::look_at_both;
 pub use text::Text;
 pub use totals::{Tally, Totals};
 

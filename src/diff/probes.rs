@@ -5,7 +5,6 @@ use super::scene_side::SceneSide;
 use crate::bounds::Aabb;
 use crate::light_tree::{LightTree, Receiver, TreeKind, TreeRow};
 use crate::measure::visited;
-use crate::pipeline;
 use crate::render::{RenderDelegate, RenderSettings};
 use glam::Vec3;
 
@@ -14,13 +13,13 @@ const PROBES: u32 = 64;
 /// Pixels to either side of the picture that probes are spread over.
 const PICTURE: u32 = 1024;
 
-/// Points that paths from the first camera of a scene visit; `None` if it has no camera, or sees
+/// Points that paths from the camera of a scene visit; `None` if it has no camera, or sees
 /// nothing.
 pub(super) fn on_camera_paths<D: AsRef<[u8]> + Sync>(
     side: &SceneSide,
     tree: &LightTree<D>,
 ) -> Option<Vec<Receiver>> {
-    let camera = pipeline::find_camera(side.scene, None).ok()?.clone();
+    let camera = side.camera?.clone();
     let settings = RenderSettings { width: PICTURE, height: PICTURE, ..Default::default() };
     let delegate = RenderDelegate::new(side.scene, &side.emitters, tree, camera, settings);
     let found = delegate.at_frame(side.frame(), |integrator| {

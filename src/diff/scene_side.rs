@@ -11,7 +11,7 @@ use crate::emitter::{
 };
 use crate::light_tree::LightTree;
 use crate::pipeline::{self, Survey};
-use crate::scene::{LightKind, Pose, Scene};
+use crate::scene::{Camera, LightKind, Pose, Scene};
 use crate::store::AlignedBytes;
 use glam::Vec3;
 use std::collections::HashMap;
@@ -19,6 +19,8 @@ use std::collections::HashMap;
 /// A scene, surveyed as for a build.
 pub(super) struct SceneSide<'a> {
     pub scene: &'a Scene,
+    /// What it is looked at through.
+    pub camera: Option<&'a Camera>,
     pub emitters: Emitters,
     /// Of all frames, but with the bounds of the first alone.
     pub survey: Survey,
@@ -32,7 +34,11 @@ pub(super) struct SceneSide<'a> {
 
 impl<'a> SceneSide<'a> {
     /// Surveys a scene for some frames, its own if none are given.
-    pub fn survey(scene: &'a Scene, frames: Option<&[i32]>) -> Result<Self, LightOverflow> {
+    pub fn survey(
+        scene: &'a Scene,
+        camera: Option<&'a Camera>,
+        frames: Option<&[i32]>,
+    ) -> Result<Self, LightOverflow> {
         let own = || pipeline::frames_of(scene);
         let frames = frames.map_or_else(own, <[i32]>::to_vec);
         let emitters = Emitters::collect(scene);
@@ -41,7 +47,7 @@ impl<'a> SceneSide<'a> {
         let pose = pose_at(scene, frames[0]);
         let profiles = Profiles::of(scene, &emitters);
         let infinite = infinite::find(scene, &pose, &frames);
-        Ok(SceneSide { scene, emitters, survey, frames, pose, profiles, infinite })
+        Ok(SceneSide { scene, camera, emitters, survey, frames, pose, profiles, infinite })
     }
 
     /// The first frame.

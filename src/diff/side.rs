@@ -7,8 +7,8 @@ use super::tree_side::TreeSide;
 use crate::emitter::LightOverflow;
 use crate::ingest::IngestError;
 use crate::light_tree::LightTree;
-use crate::pipeline::{self, OpenedTree, TreeError};
-use crate::scene::Scene;
+use crate::pipeline::{self, OpenedTree, TreeError, ViewError};
+use crate::scene::{Camera, Scene};
 use crate::store::AlignedBytes;
 use std::path::{Path, PathBuf};
 
@@ -16,6 +16,8 @@ use std::path::{Path, PathBuf};
 pub struct Side {
     name: SideName,
     content: Content,
+    /// What it is looked at through, if it is a scene.
+    pub(super) camera: Option<Camera>,
 }
 
 enum Content {
@@ -32,6 +34,9 @@ pub enum SideError {
     /// A scene cannot be read.
     #[error(transparent)]
     Scene(#[from] IngestError),
+    /// There is no camera to look through.
+    #[error(transparent)]
+    View(#[from] ViewError),
     /// A scene has a light that no tree can hold.
     #[error("{}: {cause}", path.display())]
     Overflow {
@@ -73,13 +78,14 @@ impl Side {
     /// A tree file that is open. It must have been verified.
     pub fn of_tree(path: &Path, tree: OpenedTree) -> Side {
         let name = SideName { file: path.display().to_string(), is_tree: true };
-        Side { name, content: Content::Tree(Box::new(tree)) }
+        Side { name, content: Content::Tree(Box::new(tree)), camera: None }
     }
 
-    /// A scene that has been read.
+    /// A scene that has been read. It is looked at through its first camera, if it has one.
     pub fn of_scene(scene: Scene) -> Side {
         let name = SideName { file: scene.source.display().to_string(), is_tree: false };
-        Side { name, content: Content::Scene(Box::new(scene)) }
+        let camera = scene.cameras.first().cloned();
+        Side { name, content: Content::Scene(Box::new(scene)), camera }
     }
 
     /// What it was read from.
@@ -90,6 +96,18 @@ impl Side {
     /// The scene, if it is one.
     pub fn scene(&self) -> Option<&Scene> {
         match &self.content {
+            Content::Tree(_) => None,
+            Content::Scene(scene) => Some(scene),
+        }
+    }
+
+    /// What it is looked at through, if it is a scene.
+    pub fn camera(&self) -> Option<&Camera> {
+        self.camera.as_ref()
+    }
+
+    pub(super) fn scene_mut(&mut self) -> Option<&mut Scene> {
+        match &mut self.content {
             Content::Tree(_) => None,
             Content::Scene(scene) => Some(scene),
         }
@@ -119,7 +137,7 @@ impl<'a> Surveyed<'a> {
                 return Ok(Surveyed::Tree(Box::new(tree)));
             }
             let scene = side.scene().expect("what is no tree is a scene");
-            let surveyed = SceneSide::survey(scene, frames.as_deref());
+            let surveyed = SceneSide::survey(scene, side.camera(), frames.as_deref());
             surveyed
                 .map(|scene| Surveyed::Scene(Box::new(scene)))
                 .map_err(|cause| SideError::Overflow { path: scene.source.clone(), cause })

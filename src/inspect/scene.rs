@@ -4,7 +4,7 @@ use super::VERSION;
 use super::report::FrameSpan;
 use crate::emitter::Emitters;
 use crate::pipeline;
-use crate::scene::{Requirements, Scene};
+use crate::scene::{Camera, Projection, Requirements, Scene};
 use serde::Serialize;
 
 /// A scene.
@@ -51,8 +51,22 @@ pub struct SceneReport {
 pub struct CameraReport {
     /// Its prim path.
     pub path: String,
-    /// Its vertical field of view, degrees.
-    pub height_deg: f32,
+    /// The vertical field of view of a perspective camera, degrees.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub height_deg: Option<f32>,
+    /// What an orthographic camera sees from bottom to top, metres.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub height_m: Option<f32>,
+}
+
+impl CameraReport {
+    fn of(scene: &Scene, camera: &Camera) -> CameraReport {
+        let (height_deg, height_m) = match camera.projection {
+            Projection::Perspective { yfov_rad } => (Some(yfov_rad.to_degrees()), None),
+            Projection::Orthographic { height_m } => (None, Some(height_m)),
+        };
+        CameraReport { path: scene.nodes[camera.node as usize].path.clone(), height_deg, height_m }
+    }
 }
 
 impl SceneReport {
@@ -70,14 +84,7 @@ impl SceneReport {
             instances: scene.instances.len(),
             placed_triangles: scene.instances.iter().map(|i| triangles_of(i.mesh)).sum(),
             materials: scene.materials.len(),
-            cameras: scene
-                .cameras
-                .iter()
-                .map(|camera| CameraReport {
-                    path: scene.nodes[camera.node as usize].path.clone(),
-                    height_deg: camera.yfov_rad.to_degrees(),
-                })
-                .collect(),
+            cameras: scene.cameras.iter().map(|c| CameraReport::of(scene, c)).collect(),
             frames: match frames.as_slice() {
                 &[first, .., last] => Some(FrameSpan { first, last, count: frames.len() }),
                 _ => None,
@@ -111,6 +118,7 @@ impl SceneReport {
             (needs.normal_maps, "normal maps"),
             (needs.fog, "fog"),
             (needs.lenses, "camera lenses"),
+            (needs.orthographic_cameras, "orthographic cameras"),
         ];
         features.into_iter().filter(|(count, _)| *count > 0)
     }

@@ -2,19 +2,21 @@
 //!
 //! [`load_scene`] reads a scene; [`survey()`] finds out what its tree depends on; [`build_tree`] builds
 //! the trees of a shot; [`check_fresh`] tells whether a tree still belongs to a scene, and if not,
-//! which lights changed.
+//! which lights changed. [`look()`] finds the camera that a user means, and makes one where there is none.
 
 mod build;
-mod camera;
 mod content;
+mod fit;
 mod forced;
 mod frames;
 mod fresh;
 mod look;
+pub mod option;
+mod rig;
 mod survey;
+mod view;
 
 pub use build::{Rebuilt, build_tree, rebuild_tree};
-pub use camera::{NoCamera, find_camera};
 pub use content::scene_fingerprint;
 pub use forced::{NoLightThere, force_lights};
 pub use frames::frames_of;
@@ -22,7 +24,9 @@ pub use fresh::{
     OpenedTree, StaleTree, TreeError, check_fresh, is_tree_file, open_base, open_tree,
 };
 pub use look::is_built_from;
+pub use rig::carry_camera;
 pub use survey::{Group, PlacedLight, SharedBounds, Survey, survey};
+pub use view::{ASPECT, Look, View, ViewError, look};
 
 use crate::ingest::{self, IngestError};
 use crate::scene::Scene;

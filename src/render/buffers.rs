@@ -6,7 +6,7 @@ use glam::Vec3;
 /// The finished values of one pixel: means over its samples.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pixel {
-    /// Linear radiance in the scene's unit, premultiplied by `alpha`.
+    /// Linear radiance in the scene's unit times the camera's exposure scale, premultiplied by `alpha`.
     pub beauty: Rgb,
     /// Coverage in `[0, 1]`.
     pub alpha: f32,

@@ -119,6 +119,7 @@ impl<'a, D: AsRef<[u8]> + Sync> RenderDelegate<'a, D> {
         progress: &impl Progress,
     ) -> RenderedFrame {
         let (width, height) = (self.settings.width, self.settings.height);
+        let exposure_scale = f64::from(self.camera.exposure_scale);
         let frame_seed = hash(self.settings.seed, frame as u32);
         let mut buffers = RenderBuffers::new(width, height);
         let stats = buffers
@@ -133,7 +134,7 @@ impl<'a, D: AsRef<[u8]> + Sync> RenderDelegate<'a, D> {
                     for index in 0..self.settings.samples {
                         mean.add(&integrator.trace(x as u32, y as u32, seed, index, &mut scratch));
                     }
-                    *pixel = mean.finish();
+                    *pixel = mean.finish(exposure_scale);
                 }
                 progress.rows_done(1);
                 scratch.stats
@@ -171,11 +172,12 @@ impl PixelMean {
         }
     }
 
-    fn finish(&self) -> Pixel {
+    /// The pixel, exposed: radiance is scaled, and its variance by the square.
+    fn finish(&self, exposure_scale: f64) -> Pixel {
         let count = f64::from(self.count.max(1));
         let degrees = count * (count - 1.0).max(1.0);
         Pixel {
-            beauty: self.radiance.as_vec3(),
+            beauty: (self.radiance * exposure_scale).as_vec3(),
             alpha: (f64::from(self.covered) / count) as f32,
             depth_m: if self.covered > 0 {
                 (self.depth_m / f64::from(self.covered)) as f32
@@ -184,7 +186,7 @@ impl PixelMean {
             },
             normal: self.normal.normalize_or_zero(),
             albedo: (self.albedo / count).as_vec3(),
-            variance: (self.spread / degrees).as_vec3(),
+            variance: (self.spread / degrees * exposure_scale.powi(2)).as_vec3(),
             samples: self.count,
         }
     }

@@ -1,23 +1,20 @@
 //! Output names with a place for the frame number: `street.####.exr`, `street.%04d.exr`.
 
 use super::frames::Frames;
-use std::path::PathBuf;
+use std::path::{PathBuf, is_separator};
 use thiserror::Error;
 
-/// A pattern from which every frame gets its name. Each run of `#` is the frame number padded with
-/// zeros to the run's length; `%d` and `%04d` do as in C; `%%` is a percent sign. A number that is
+/// A pattern from which every frame gets its name. In the file's own name one run of `#` is the frame
+/// number, padded with zeros to the run's length; or `%d` or `%04d` is, as in C. `%%` is a percent sign
+/// there, and `%#` a number sign. The folders before it are taken as they are written. A number that is
 /// longer than its place is written in full.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct FrameNames {
     pattern: String,
-    parts: Vec<Part>,
-}
-
-#[derive(Clone, Debug, PartialEq, Eq)]
-enum Part {
-    Text(String),
-    /// The frame number, at least so many characters long.
-    Number(usize),
+    /// All that stands before the number, or the whole name.
+    before: String,
+    /// The least length of the number, and what stands after it.
+    number: Option<(usize, String)>,
 }
 
 /// Why a pattern does not name the frames.
@@ -25,8 +22,8 @@ enum Part {
 pub enum FrameNamesError {
     /// Several frames, one name.
     #[error(
-        "all {count} frames would be written to '{pattern}'; give the name a place for the frame \
-         number, such as '{suggestion}'"
+        "all {count} frames would be written to '{pattern}'; give the file's name a place for the \
+         frame number, such as '{suggestion}'"
     )]
     Shared {
         /// The pattern.
@@ -36,12 +33,17 @@ pub enum FrameNamesError {
         /// The same name with a place for the number.
         suggestion: String,
     },
-    /// A `%` that does not begin `%d`, `%04d` or `%%`.
+    /// A `%` that does not begin `%d`, `%04d`, `%%` or `%#`.
     #[error("'{0}' has a % that is neither %d nor %04d; write %% for a percent sign")]
     Percent(String),
     /// `###.###`.
     #[error("'{0}' asks for parts of frames (#.#); frames are whole numbers")]
     SubFrames(String),
+    /// Two places.
+    #[error(
+        "'{0}' has several places for the frame number; leave one, and write %# for a number sign"
+    )]
+    Several(String),
     /// A pattern that names a folder, or nothing.
     #[error("'{0}' names no file")]
     NoFile(String),
@@ -50,51 +52,52 @@ pub enum FrameNamesError {
 impl FrameNames {
     /// Understands a pattern.
     pub fn new(pattern: &str) -> Result<FrameNames, FrameNamesError> {
-        if pattern.contains("#.#") {
-            return Err(FrameNamesError::SubFrames(pattern.into()));
-        }
-        if pattern.is_empty() || pattern.ends_with(std::path::is_separator) {
+        let (folder, file) = pattern.split_at(start_of_file(pattern));
+        if matches!(file, "" | "." | "..") {
             return Err(FrameNamesError::NoFile(pattern.into()));
         }
         let wrong = || FrameNamesError::Percent(pattern.into());
-        let (mut parts, mut text, mut rest) = (Vec::new(), String::new(), pattern);
+        let (mut before, mut number) = (folder.to_owned(), None);
+        let mut rest = file;
         while let Some(next) = rest.chars().next() {
-            let width = match next {
-                '#' => {
-                    let run = rest.len() - rest.trim_start_matches('#').len();
-                    rest = &rest[run..];
-                    run
-                }
-                '%' if rest.starts_with("%%") => {
-                    text.push('%');
-                    rest = &rest[2..];
-                    continue;
-                }
-                '%' => {
-                    let (width, after) = rest[1..].split_once('d').ok_or_else(wrong)?;
-                    rest = after;
-                    c_width(width).ok_or_else(wrong)?
-                }
-                other => {
-                    text.push(other);
-                    rest = &rest[other.len_utf8()..];
-                    continue;
-                }
+            let text = match &mut number {
+                None => &mut before,
+                Some((_, after)) => after,
             };
-            parts.extend([Part::Text(std::mem::take(&mut text)), Part::Number(width)]);
+            let width = if next == '#' {
+                let run = rest.len() - rest.trim_start_matches('#').len();
+                rest = &rest[run..];
+                run
+            } else if next != '%' || rest.starts_with("%%") || rest.starts_with("%#") {
+                // Of a pair the second is meant.
+                let skipped = if next == '%' { 1 } else { 0 };
+                let length = rest[skipped..].chars().next().map_or(0, char::len_utf8);
+                text.push_str(&rest[skipped..skipped + length]);
+                rest = &rest[skipped + length..];
+                continue;
+            } else {
+                let (width, after) = rest[1..].split_once('d').ok_or_else(wrong)?;
+                rest = after;
+                c_width(width).ok_or_else(wrong)?
+            };
+            if number.is_some() {
+                let is_fraction = file.contains("#.#");
+                let error =
+                    if is_fraction { FrameNamesError::SubFrames } else { FrameNamesError::Several };
+                return Err(error(pattern.into()));
+            }
+            number = Some((width, String::new()));
         }
-        parts.push(Part::Text(text));
-        Ok(FrameNames { pattern: pattern.into(), parts })
+        Ok(FrameNames { pattern: pattern.into(), before, number })
     }
 
     /// Makes sure that every frame has a name of its own.
     pub fn check(&self, frames: &Frames) -> Result<(), FrameNamesError> {
         let count = frames.as_slice().len();
-        let numbered = self.parts.iter().any(|part| matches!(part, Part::Number(_)));
-        if count <= 1 || numbered {
+        if count <= 1 || self.number.is_some() {
             return Ok(());
         }
-        let file = self.pattern.rfind(std::path::is_separator).map_or(0, |at| at + 1);
+        let file = start_of_file(&self.pattern);
         let dot = self.pattern[file..].rfind('.').map_or(self.pattern.len(), |at| file + at);
         let suggestion = format!("{}.####{}", &self.pattern[..dot], &self.pattern[dot..]);
         Err(FrameNamesError::Shared { pattern: self.pattern.clone(), count, suggestion })
@@ -102,12 +105,16 @@ impl FrameNames {
 
     /// The name of a frame.
     pub fn path(&self, frame: i32) -> PathBuf {
-        let text = |part: &Part| match part {
-            Part::Text(text) => text.clone(),
-            Part::Number(width) => format!("{frame:0width$}"),
-        };
-        self.parts.iter().map(text).collect::<String>().into()
+        match &self.number {
+            None => self.before.clone().into(),
+            Some((width, after)) => format!("{}{frame:0width$}{after}", self.before).into(),
+        }
     }
+}
+
+/// Where the file's own name begins.
+fn start_of_file(pattern: &str) -> usize {
+    pattern.rfind(is_separator).map_or(0, |at| at + 1)
 }
 
 /// The width between `%` and `d`: nothing, or `0` and one or two digits.
@@ -139,7 +146,14 @@ mod tests {
             ("a.#.exr", 1001, "a.1001.exr"),
             ("a.##.exr", 1001, "a.1001.exr"),
             ("a.####.exr", -5, "a.-005.exr"),
-            ("f####/a_%%_####.exr", 12, "f0012/a_%_0012.exr"),
+            ("a_%%_####.exr", 12, "a_%_0012.exr"),
+            ("a%#1_####.exr", 12, "a#1_0012.exr"),
+            ("a%##.exr", 12, "a#12.exr"),
+            ("%#%%%d%%%#.exr", 12, "#%12%#.exr"),
+            // Folders are as they are.
+            ("/jobs/shot#12/f.####.exr", 7, "/jobs/shot#12/f.0007.exr"),
+            ("####/%04d/50%/%%/#.#/%#/f.##.exr", 7, "####/%04d/50%/%%/#.#/%#/f.07.exr"),
+            ("shot#12/still.exr", 7, "shot#12/still.exr"),
             ("straße.###.exr", 3, "straße.003.exr"),
             ("still.exr", 3, "still.exr"),
         ] {
@@ -157,6 +171,8 @@ mod tests {
             ("out.v2/still.exr", "'out.v2/still.####.exr'"),
             ("out.v2/still", "'out.v2/still.####'"),
             ("100%%.exr", "'100%%.####.exr'"),
+            ("####/still.exr", "'####/still.####.exr'"),
+            ("take%#1.exr", "'take%#1.####.exr'"),
         ] {
             let error = check(pattern, "1-3").unwrap_err().to_string();
             assert!(error.contains(suggestion) && error.contains("all 3 frames"), "{error}");
@@ -172,7 +188,13 @@ mod tests {
             assert!(matches!(error, FrameNamesError::Percent(_)), "{pattern}: {error}");
         }
         assert!(matches!(FrameNames::new("a.###.###.exr"), Err(FrameNamesError::SubFrames(_))));
-        assert!(matches!(FrameNames::new("out/"), Err(FrameNamesError::NoFile(_))));
-        assert!(matches!(FrameNames::new(""), Err(FrameNamesError::NoFile(_))));
+        for pattern in ["a.####_##.exr", "%d_%04d.exr", "#a%d", "#%##"] {
+            let error = FrameNames::new(pattern).unwrap_err();
+            assert!(matches!(error, FrameNamesError::Several(_)), "{pattern}: {error}");
+        }
+        for pattern in ["out/", "", ".", "out/..", "#/"] {
+            let error = FrameNames::new(pattern).unwrap_err();
+            assert!(matches!(error, FrameNamesError::NoFile(_)), "{pattern}: {error}");
+        }
     }
 }

@@ -117,7 +117,7 @@ impl Integrator<'_> {
     ) -> PathSample {
         let mut sampler = Sampler::new(seed, index);
         let [px, py, lx, ly] = sampler.next_4d();
-        let CameraRay { mut origin, mut direction } =
+        let CameraRay { mut origin, mut direction, mut reach_m } =
             self.camera.ray(x, y, Vec2::new(px, py), Vec2::new(lx, ly));
         let accept = self.cutouts(hash(seed, index));
         let mut seen = PathSample::default();
@@ -125,7 +125,8 @@ impl Integrator<'_> {
         let mut before: Option<Origin> = None;
         for bounce in 0..=self.settings.depth {
             scratch.stats.rays += 1;
-            let hit = self.tracer.closest(origin, direction, f32::INFINITY, &accept);
+            let hit = self.tracer.closest(origin, direction, reach_m, &accept);
+            reach_m = f32::INFINITY;
             if let Some(fog) = &self.fog {
                 let length = hit.as_ref().map_or(f32::INFINITY, |hit| hit.t);
                 if bounce < self.settings.depth {
@@ -195,14 +196,15 @@ impl Integrator<'_> {
     pub fn probe(&self, x: u32, y: u32, seed: u32, bounces: u32) -> Option<Vertex> {
         let mut sampler = Sampler::new(seed, 0);
         let [px, py, lx, ly] = sampler.next_4d();
-        let CameraRay { mut origin, mut direction } =
+        let CameraRay { mut origin, mut direction, mut reach_m } =
             self.camera.ray(x, y, Vec2::new(px, py), Vec2::new(lx, ly));
         let accept = self.cutouts(seed);
         let mut last = None;
         for _ in 0..=bounces {
-            let Some(hit) = self.tracer.closest(origin, direction, f32::INFINITY, &accept) else {
+            let Some(hit) = self.tracer.closest(origin, direction, reach_m, &accept) else {
                 break;
             };
+            reach_m = f32::INFINITY;
             let Some(vertex) = self.vertex(&hit, -direction) else { break };
             let [lobe, bu, bv, _] = sampler.next_4d();
             let next = vertex.reflection.sample(lobe, Vec2::new(bu, bv));

@@ -30,7 +30,7 @@ mod texture;
 mod timeline;
 mod values;
 
-pub use camera::Camera;
+pub use camera::{Camera, Projection};
 pub use light::{Light, LightKind, Shaping};
 pub use material::{AlphaMode, Material};
 pub use medium::{FogBox, Medium};

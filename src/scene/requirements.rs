@@ -1,6 +1,6 @@
 //! What a scene needs of the tree and the renderer.
 
-use super::{AlphaMode, LightKind, Scene};
+use super::{AlphaMode, Camera, LightKind, Projection, Scene};
 use serde::Serialize;
 
 /// The features that a scene switches on. What is false or zero here costs nothing anywhere.
@@ -38,6 +38,8 @@ pub struct Requirements {
     pub fog: usize,
     /// Cameras with a lens.
     pub lenses: usize,
+    /// Orthographic cameras.
+    pub orthographic_cameras: usize,
 }
 
 impl Requirements {
@@ -76,6 +78,8 @@ impl Requirements {
         }
         needs.fog = usize::from(scene.medium.is_some());
         needs.lenses = scene.cameras.iter().filter(|c| c.lens_radius_m > 0.0).count();
+        let is_parallel = |c: &&Camera| matches!(c.projection, Projection::Orthographic { .. });
+        needs.orthographic_cameras = scene.cameras.iter().filter(is_parallel).count();
         needs
     }
 }

@@ -7,8 +7,11 @@
 //!
 //! Of two writers of one name the last to finish wins. A writer that is killed (`kill -9`, a machine that
 //! stops) cannot clean up: its temporary file, `.candelabra-*.part` in the output's folder, stays. Nothing
-//! reads it and no later writer takes its name; who wants the space back may remove those that are older
-//! than any job that runs.
+//! reads it and no later writer takes its name. Such files may be removed once they are older than any
+//! job that runs.
+//!
+//! Work that ends in a file should not be found to be in vain when it is done: [`check_writable`] tells
+//! beforehand, as far as can be told.
 
 use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
@@ -35,21 +38,59 @@ pub fn write_atomically(
     })
 }
 
-fn replace(
-    path: &Path,
-    write: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>,
-) -> io::Result<()> {
-    let folder = match path.parent() {
+/// Makes sure that a file can be written: that no folder or device has its name, and that its folder, or
+/// the nearest one above it that is there, takes a temporary file. Nothing is left behind. Errors name
+/// the path and the remedy.
+pub fn check_writable(path: &Path) -> io::Result<()> {
+    check(path).map_err(|error| {
+        let problem =
+            format!("{}: cannot be written: {error}; choose another output", path.display());
+        io::Error::new(error.kind(), problem)
+    })
+}
+
+fn check(path: &Path) -> io::Result<()> {
+    match fs::metadata(path) {
+        Ok(there) if there.is_dir() => {
+            return Err(io::Error::new(io::ErrorKind::IsADirectory, "it is a folder"));
+        }
+        Ok(there) if !there.is_file() => {
+            return Err(io::Error::new(io::ErrorKind::AlreadyExists, "it is a device or a pipe"));
+        }
+        Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(error),
+        _ => {}
+    }
+    let mut folder = folder_of(path);
+    while fs::symlink_metadata(folder).is_err() && folder != Path::new(".") {
+        folder = folder_of(folder);
+    }
+    temporary_file().tempfile_in(folder).map(drop)
+}
+
+/// The folder that a file belongs in.
+fn folder_of(path: &Path) -> &Path {
+    match path.parent() {
         Some(folder) if !folder.as_os_str().is_empty() => folder,
         _ => Path::new("."),
-    };
-    fs::create_dir_all(folder)?;
+    }
+}
+
+fn temporary_file() -> Builder<'static, 'static> {
     let mut builder = Builder::new();
     builder.prefix(".candelabra-").suffix(".part");
     // A temporary file is private by default; an output is as open as the user's mask allows.
     #[cfg(unix)]
     builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-    let temporary = builder.tempfile_in(folder)?;
+    builder
+}
+
+fn replace(
+    path: &Path,
+    write: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>,
+) -> io::Result<()> {
+    let folder = folder_of(path);
+    fs::create_dir_all(folder)?;
+    let temporary = temporary_file().tempfile_in(folder)?;
     let (file, name) = temporary.into_parts();
     let mut buffer = BufWriter::new(file);
     write(&mut buffer)?;
@@ -104,6 +145,30 @@ mod tests {
         assert!(error.to_string().contains("taken"));
         fs::write(folder.path().join("file"), "").unwrap();
         assert!(write_atomically(&folder.path().join("file/below"), |_| Ok(())).is_err());
+    }
+
+    #[test]
+    fn what_can_be_written_is_told_beforehand_and_nothing_is_left() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = |name: &str| folder.path().join(name);
+        fs::create_dir(path("taken")).unwrap();
+        fs::write(path("file"), "old").unwrap();
+        for name in ["new", "file", "taken/new", "a/b/c/new"] {
+            check_writable(&path(name)).unwrap();
+        }
+        let long = "x".repeat(300);
+        for name in ["taken", "file/below", "file/a/below", &long] {
+            let error = check_writable(&path(name)).unwrap_err();
+            assert!(error.to_string().contains(name), "{error}");
+            assert!(write_atomically(&path(name), |_| Ok(())).is_err(), "{name}");
+        }
+        #[cfg(target_os = "linux")]
+        for name in ["/proc/nope", "/proc/nope/deep/file", "/dev/null"] {
+            assert!(check_writable(Path::new(name)).is_err(), "{name}");
+        }
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 2);
+        assert_eq!(fs::read_to_string(path("file")).unwrap(), "old");
+        assert_eq!(fs::read_dir(path("taken")).unwrap().count(), 0);
     }
 
     #[cfg(unix)]

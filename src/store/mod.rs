@@ -12,7 +12,7 @@ mod error;
 mod map;
 mod rule;
 
-pub use atomic::write_atomically;
+pub use atomic::{check_writable, write_atomically};
 pub use bytes::{ALIGNMENT, AlignedBytes};
 pub use container::{Container, ContainerWriter, MAGIC, Section, SectionId, VERSION};
 pub use error::{RULES_OF_HEADER, RULES_OF_TABLE, StoreError};

@@ -11,3 +11,4 @@ mod render;
 mod resume;
 mod trees;
 mod verify;
+mod views;

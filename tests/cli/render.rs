@@ -71,6 +71,30 @@ fn usage_is_exit_code_two() {
         "-o a.exr --frames 1-9:2",
         "-o a.exr --light-sampler best",
         "-o a.exr --what",
+        "-o a.exr --split nan",
+        "-o a.exr --split -0.1",
+        "-o a.exr --exposure 1",
+        "-o a.exr --png --exposure nan",
+        "-o a.exr --png --exposure -inf",
+        "-o a.exr --png --exposure 1e9",
+        "-o a.exr --fog nan",
+        "-o a.exr --fog 1,2",
+        "-o a.exr --fog 1,1,inf",
+        "-o a.exr --fov 40",
+        "-o a.exr --fit --fov nan",
+        "-o a.exr --fit --fov 0",
+        "-o a.exr --fit --fov 180",
+        "-o a.exr --fit --camera /eye",
+        "-o a.exr --fit --look-from 1,2,3",
+        "-o a.exr --look-at 1,2,3",
+        "-o a.exr --look-from 1,2",
+        "-o a.exr --look-from 1,2,nan",
+        "-o a.exr --look-from 1,2,inf",
+        "-o a.exr --look-from 1,2,3 --camera 0",
+        "-o a.exr --look-from 1,2,3 --look-at 1,2,3",
+        "-o a.exr --look-from 0,2,0 --look-at 0,0,0 --up 0,-9,0",
+        "-o a.####_##.exr",
+        "-o a.%d%04d.exr",
     ] {
         let told = shot.render(wrong).ends(2);
         assert!(told.out.is_empty() && !told.err.is_empty(), "{told:?}");
@@ -99,12 +123,52 @@ fn a_camera_is_found_by_path_or_number_or_listed() {
             .ends(1)
             .complains(&[SCENE, unknown, "/eye", "/side"]);
     }
-    shot.edit(|json| {
-        json["nodes"][2].as_object_mut().unwrap().remove("camera");
-        json["nodes"][3].as_object_mut().unwrap().remove("camera");
-    });
-    shot.render("-o a.exr").ends(1).complains(&[SCENE, "no camera"]);
-    shot.render("--camera /eye -o a.exr").ends(1).complains(&[SCENE, "no camera"]);
+}
+
+/// Folders are taken as they are written, and `%#` is a number sign.
+#[test]
+fn only_the_files_own_name_has_a_place_for_the_number() {
+    let shot = Shot::still();
+    shot.render("-o shot#12/f.####.exr --frames 7").ends(0);
+    shot.render("-o %04d/take%#1_%d.exr --frames 7").ends(0);
+    for name in ["shot#12/f.0007.exr", "%04d/take#1_7.exr"] {
+        assert!(is_picture(&shot.path(name)), "{name}");
+    }
+    assert_eq!(shot.names(), ["%04d", "shot#12", SCENE]);
+    shot.render("-o ####/f.exr --frames 1-2")
+        .ends(2)
+        .complains(&["all 2 frames", "####/f.####.exr"]);
+}
+
+/// What takes hours must not end in "cannot be written". Nothing is rendered: no samples could be.
+#[test]
+fn what_cannot_be_written_is_refused_before_anything_is_rendered() {
+    let shot = Shot::still();
+    std::fs::create_dir(shot.path("taken.exr")).unwrap();
+    std::fs::create_dir(shot.path("look.png")).unwrap();
+    shot.write("file", "no folder");
+    let never = "--spp 4000000000 --res 4096x4096";
+    for (output, named) in [
+        ("taken.exr", "taken.exr"),
+        ("look.exr --png", "look.png"),
+        ("file/a.exr", "file/a.exr"),
+        ("file/deep/a.####.exr --frames 1-3", "file/deep/a.0001.exr"),
+        #[cfg(target_os = "linux")]
+        ("/proc/nope/a.####.exr --frames 1-3", "/proc/nope/a.0001.exr"),
+    ] {
+        let told = shot.render(&format!("{never} -o {output}")).ends(1);
+        assert!(told.out.is_empty(), "{told:?}");
+        told.complains(&[named, "cannot be written", "choose another output"]);
+    }
+    assert_eq!(shot.names(), ["file", "look.png", SCENE, "taken.exr"]);
+    // One frame of several is said at its turn, and not rendered either.
+    std::fs::create_dir(shot.path("b.2.exr")).unwrap();
+    let told = shot.render("-o b.#.exr --frames 1-3").ends(1).says("frame 2: failed: b.2.exr");
+    told.says("b.1.exr").says("b.3.exr");
+    // A shot that is done needs no writing.
+    let done = "-o still.exr --resume";
+    shot.render(done).ends(0);
+    shot.render(done).ends(0).says("up to date");
 }
 
 #[test]

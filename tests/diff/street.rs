@@ -57,14 +57,7 @@ pub fn instance(scene: &Scene, node: u32, mesh: u32) -> Instance {
 /// A camera that sees all of it.
 pub fn with_camera(mut scene: Scene) -> Scene {
     let node = put(&mut scene, "eye", [4.0, 2.0, 14.0]);
-    scene.cameras.push(Camera {
-        node,
-        yfov_rad: 0.8,
-        aspect: Some(1.5),
-        lens_radius_m: 0.0,
-        focus_distance_m: 1.0,
-        film_offset: [0.0; 2],
-    });
+    scene.cameras.push(Camera { aspect: Some(1.5), ..Camera::perspective(node, 0.8) });
     scene
 }
 

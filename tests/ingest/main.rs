@@ -1,5 +1,6 @@
 //! Files in, a scene index out.
 
+mod cameras;
 mod corpus;
 mod files;
 mod fog;

@@ -2,7 +2,7 @@
 
 use crate::files;
 use crate::files::{File, lamp};
-use candelabra::scene::{LightKind, Pixels, Scene, Shaping, Timeline};
+use candelabra::scene::{LightKind, Pixels, Projection, Scene, Shaping, Timeline};
 use glam::Vec3;
 use serde_json::json;
 use std::f32::consts::{FRAC_PI_3, FRAC_PI_6};
@@ -138,13 +138,14 @@ fn a_camera_has_a_lens() {
             file.add("nodes", json!({"camera": 1}));
             file.json["scenes"][0]["nodes"] = json!([0, 1]);
         });
-        assert_eq!(scene.notes.len(), 1, "orthographic: {:?}", scene.notes);
+        assert_eq!(scene.notes.len(), 1, "a camera without a projection: {:?}", scene.notes);
         scene.cameras[0].clone()
     };
     let lens = camera(json!({
         "fStop": 2, "focalLength_m": 0.05, "focusDistance_m": 3, "filmOffset": [0.1, -0.2],
     }));
-    assert_eq!((lens.yfov_rad, lens.aspect), (0.5, Some(1.5)));
+    assert_eq!(lens.projection, Projection::Perspective { yfov_rad: 0.5 });
+    assert_eq!(lens.aspect, Some(1.5));
     assert_eq!((lens.lens_radius_m, lens.focus_distance_m), (0.0125, 3.0));
     assert_eq!(lens.film_offset, [0.1, -0.2]);
     let pinhole = camera(json!({"fStop": 0, "focalLength_m": 0.05, "focusDistance_m": 3}));

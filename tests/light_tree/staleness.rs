@@ -83,14 +83,7 @@ fn street() -> Scene {
         scene.lights.push(Light { node, kind, values: None, range_m: None, forced: false });
     }
     let eye = node("/eye");
-    scene.cameras.push(Camera {
-        node: eye,
-        yfov_rad: 0.8,
-        aspect: None,
-        lens_radius_m: 0.0,
-        focus_distance_m: 1.0,
-        film_offset: [0.0; 2],
-    });
+    scene.cameras.push(Camera::perspective(eye, 0.8));
     let (tram, eye) = (scene.lights[TRAM].node as usize, eye as usize);
     scene.nodes[tram].channels = vec![Channel::Translation(keys([Vec3::ZERO, Vec3::X]))];
     scene.nodes[eye].channels = vec![Channel::Translation(keys([Vec3::ZERO, Vec3::X]))];
@@ -138,7 +131,7 @@ fn what_the_tree_does_not_depend_on_keeps_it_fresh() {
     assert_eq!(staleness(&street()), None);
     let edits: Edits<()> = vec![
         ("camera moved", (), |s| move_node(s, "/eye", |t, _, _| t.x += 9.0)),
-        ("lens", (), |s| s.cameras[0].yfov_rad = 0.5),
+        ("lens", (), |s| s.cameras[0] = Camera::perspective(s.cameras[0].node, 0.5)),
         ("camera removed", (), |s| s.cameras.clear()),
         ("camera moves for longer", (), |s| {
             let longer = Keys { times_s: vec![0.0, 9.0], ..keys([Vec3::ZERO, Vec3::Y]) };

@@ -7,7 +7,7 @@ use crate::stage::{Set, Stage, aimed, at, by, direct, facing, glow, lambert, sca
 use crate::statistics::assert_even;
 use crate::strategies::{WAYS, Way, assert_agreement, disagreement, render};
 use candelabra::render::{LightStrategy, RenderSettings};
-use candelabra::scene::{FogBox, LightKind, Medium, Shaping, Trs};
+use candelabra::scene::{FogBox, LightKind, Medium, Projection, Shaping, Trs};
 use glam::{DAffine3, DQuat, DVec3, Vec3};
 use std::f64::consts::PI;
 
@@ -139,7 +139,7 @@ fn a_light_almost_in_line_or_very_far_is_scattered_as_quadrature_says() {
         (DVec3::new(2e5, -3e5, 2e5), 1e12),
     ] {
         let (mut stage, to_box) = into_a_box(medium(0.4, 0.1, 0.2));
-        stage.scene.cameras[0].yfov_rad = 1e-6;
+        stage.scene.cameras[0].projection = Projection::Perspective { yfov_rad: 1e-6 };
         stage.light(LightKind::Point { intensity_cd: Vec3::splat(intensity) }, at(place));
         let lit = |p: DVec3| vec![(place, f64::from(intensity) / place.distance_squared(p))];
         let expected = quadrature(&stage, &to_box, 2000, &lit);

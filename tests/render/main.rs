@@ -2,9 +2,11 @@
 //! other.
 
 mod bounces;
+mod cameras;
 mod closed_forms;
 mod determinism;
 mod extremes;
+mod fitted;
 mod fog;
 mod forced;
 mod lens;

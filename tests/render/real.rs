@@ -2,56 +2,17 @@
 
 use crate::shared;
 use crate::stage::Set;
-use candelabra::bounds::Aabb;
 use candelabra::emitter::Emitters;
 use candelabra::light_tree::LightTree;
-use candelabra::pipeline;
+use candelabra::pipeline::{self, ASPECT, View};
 use candelabra::render::{RenderDelegate, RenderSettings};
-use candelabra::scene::{Camera, Light, LightKind, Node, Scene, Trs};
-use glam::{DVec3, Vec3};
+use candelabra::scene::{Light, LightKind, Node, Scene, Trs};
+use glam::Vec3;
 use std::path::Path;
 use std::time::Instant;
 
 /// Too large for a test of every day: 17.86 million emissive triangles; see below.
 const HUGE: &str = "luxcore_lightinstances";
-
-/// A box around everything that a ray can hit, and the lights.
-fn bounds(scene: &Scene) -> Aabb {
-    let pose = scene.pose_at(0.0);
-    let mut all = Aabb::EMPTY;
-    for instance in &scene.instances {
-        let mesh = Aabb::around(scene.meshes[instance.mesh as usize].positions.iter().copied());
-        if !mesh.is_empty() {
-            all = all.union(&mesh.transformed(&pose.world(instance.node)));
-        }
-    }
-    let lights = scene.lights.iter().map(|light| Vec3::from(pose.world(light.node).translation));
-    all.union(&Aabb::around(lights))
-}
-
-/// A camera that sees everything, where the file has none.
-fn with_camera(scene: &mut Scene) {
-    if !scene.cameras.is_empty() {
-        return;
-    }
-    let all = bounds(scene);
-    let (center, reach) = match all.is_empty() || !all.extent().is_finite() {
-        true => (DVec3::ZERO, 1.0),
-        false => (all.center().as_dvec3(), f64::from(all.extent().length()).max(1e-6)),
-    };
-    let translation = center + 1.2 * reach * DVec3::new(0.4, 0.5, 0.77);
-    let rotation = glam::DQuat::from_rotation_arc(DVec3::Z, (translation - center).normalize());
-    let place = Trs::Parts { translation, rotation, scale: DVec3::ONE };
-    scene.nodes.push(Node::fixed("/test_camera", None, place));
-    scene.cameras.push(Camera {
-        node: scene.nodes.len() as u32 - 1,
-        yfov_rad: 0.8,
-        aspect: None,
-        lens_radius_m: 0.0,
-        focus_distance_m: 1.0,
-        film_offset: [0.0; 2],
-    });
-}
 
 fn settings() -> RenderSettings {
     RenderSettings { width: 32, height: 18, samples: 2, depth: 2, ..Default::default() }
@@ -67,12 +28,13 @@ fn with_light(scene: &mut Scene) {
     }
 }
 
-/// Builds, verifies and renders a scene's first frame; tells how bright it is.
+/// Builds, verifies and renders a scene's first frame as `candelabra-render` does without options; tells
+/// how bright it is.
 fn render(mut scene: Scene) -> f32 {
-    with_camera(&mut scene);
     with_light(&mut scene);
+    let camera = pipeline::look(&mut scene, &View::default(), ASPECT).unwrap().camera;
     let frame = pipeline::frames_of(&scene)[0];
-    let buffers = Set::of(&scene, &[frame]).render(&settings(), frame);
+    let buffers = Set::of(&scene, &[frame]).seen_by(camera, &settings(), frame);
     let beauty = || buffers.pixels().iter().map(|pixel| pixel.beauty);
     assert!(beauty().all(|color| color.is_finite() && color.min_element() >= 0.0));
     beauty().map(|color| color.element_sum()).sum::<f32>() / (3 * buffers.pixels().len()) as f32
@@ -116,8 +78,9 @@ fn seventeen_million_emitters() {
     };
     let file = folder.join(HUGE).join("gltf/lightinstances.gltf");
     let mut scene = pipeline::load_scene(&file).unwrap();
-    with_camera(&mut scene);
     tell("loaded");
+    let camera = pipeline::look(&mut scene, &View::default(), ASPECT).unwrap().camera;
+    tell("framed");
     let emitters = Emitters::collect(&scene);
     assert_eq!(emitters.len(), 17_859_968);
     tell("emitters collected");
@@ -127,7 +90,6 @@ fn seventeen_million_emitters() {
     tell("built");
     tree.verify().unwrap();
     tell("verified");
-    let camera = scene.cameras[0].clone();
     let delegate = RenderDelegate::new(&scene, &emitters, &tree, camera, settings());
     tell("geometry prepared");
     let buffers = delegate.render(1, &()).unwrap().buffers;

@@ -159,14 +159,7 @@ impl Stage {
         yfov_rad: f32,
     ) -> &mut Camera {
         let node = self.node(aimed(from, at));
-        self.scene.cameras.push(Camera {
-            node,
-            yfov_rad,
-            aspect: None,
-            lens_radius_m: 0.0,
-            focus_distance_m: 1.0,
-            film_offset: [0.0; 2],
-        });
+        self.scene.cameras.push(Camera::perspective(node, yfov_rad));
         self.scene.cameras.last_mut().unwrap()
     }
 
@@ -192,7 +185,11 @@ impl<'a> Set<'a> {
 
     /// A frame, seen by the first camera.
     pub fn render(&self, settings: &RenderSettings, frame: i32) -> RenderBuffers {
-        let camera = self.scene.cameras[0].clone();
+        self.seen_by(self.scene.cameras[0].clone(), settings, frame)
+    }
+
+    /// A frame, seen by a camera that stands at a node of the scene.
+    pub fn seen_by(&self, camera: Camera, settings: &RenderSettings, frame: i32) -> RenderBuffers {
         RenderDelegate::new(self.scene, &self.emitters, &self.tree, camera, settings.clone())
             .render(frame, &())
             .unwrap_or_else(|error| panic!("{error}"))

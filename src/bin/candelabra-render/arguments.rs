@@ -1,11 +1,11 @@
 //! The command line.
 
+use candelabra::pipeline::{ASPECT, View, option};
 use candelabra::render::frame_names::FrameNames;
 use candelabra::render::frames::Frames;
 use candelabra::render::{LightStrategy, RenderSettings, SplitBy};
 use candelabra::scene::Medium;
 use clap::{Parser, ValueEnum};
-use glam::Vec3;
 use std::path::PathBuf;
 
 /// Renders the frames of a shot through a light tree.
@@ -22,7 +22,8 @@ pub struct Arguments {
     /// Frames: 1001-1048, 1001-1048x2, 1,5,9; the first of the scene if not given
     #[arg(short, long, allow_hyphen_values = true)]
     pub frames: Option<Frames>,
-    /// The pictures: street.####.exr or street.%04d.exr
+    /// The pictures: street.####.exr or street.%04d.exr. In the file's name %# is a number sign and %% a
+    /// percent sign; folders are taken as they are written
     #[arg(short, long, value_parser = pictures)]
     pub output: FrameNames,
     /// Samples of each pixel
@@ -32,11 +33,10 @@ pub struct Arguments {
     #[arg(long, default_value_t = 5)]
     pub depth: u32,
     /// Size of the picture in pixels, WxH; 720 high in the camera's shape if not given
-    #[arg(long, value_parser = resolution)]
+    #[arg(long, value_parser = option::size)]
     pub res: Option<(u32, u32)>,
-    /// Camera, by prim path or number; the first if not given
-    #[arg(long)]
-    pub camera: Option<String>,
+    #[command(flatten)]
+    pub view: View,
     /// Another seed, another noise
     #[arg(long, default_value_t = 0)]
     pub seed: u32,
@@ -47,7 +47,7 @@ pub struct Arguments {
     #[arg(long, value_enum, default_value_t = Strategy::Tree)]
     pub light_sampler: Strategy,
     /// How readily clusters of lights are split: 0 samples one light at a point, 1 every one
-    #[arg(long, default_value_t = RenderSettings::default().split, value_parser = knob)]
+    #[arg(long, default_value_t = RenderSettings::default().split, value_parser = option::knob)]
     pub split: f32,
     /// At most so many lights are sampled at a point, beside the forced ones
     #[arg(long, default_value_t = RenderSettings::default().max_lights, value_parser = clap::value_parser!(u32).range(1..))]
@@ -61,13 +61,13 @@ pub struct Arguments {
     pub force_light: Vec<String>,
     /// Fill the scene with fog, in place of its own: extinction per metre, albedo (1 if not given)
     /// and anisotropy (0), as 0.02,0.9,0.3
-    #[arg(long, value_name = "EXTINCTION,ALBEDO,G", value_parser = fog)]
+    #[arg(long, value_name = "EXTINCTION,ALBEDO,G", value_parser = option::fog)]
     pub fog: Option<Medium>,
     /// Write a PNG beside each picture
     #[arg(long)]
     pub png: bool,
     /// Exposure of the PNG in stops; chosen from the first picture if not given
-    #[arg(long, allow_negative_numbers = true, requires = "png")]
+    #[arg(long, allow_negative_numbers = true, requires = "png", value_parser = option::stops)]
     pub exposure: Option<f32>,
     /// Beauty in 32-bit floats instead of 16
     #[arg(long)]
@@ -106,40 +106,8 @@ pub enum Test {
     SolidAngle,
 }
 
-fn knob(text: &str) -> Result<f32, String> {
-    let knob = text.parse().ok().filter(|knob| (0.0..=1.0).contains(knob));
-    knob.ok_or_else(|| "write a number from 0 to 1".into())
-}
-
-fn fog(text: &str) -> Result<Medium, String> {
-    let numbers: Option<Vec<f32>> = text.split(',').map(|part| part.trim().parse().ok()).collect();
-    let numbers = numbers.filter(|numbers| (1..=3).contains(&numbers.len()));
-    let Some(numbers) = numbers else {
-        return Err("write EXTINCTION,ALBEDO,G, such as 0.02,0.9,0.3".into());
-    };
-    let albedo = numbers.get(1).copied().unwrap_or(1.0);
-    let anisotropy = numbers.get(2).copied().unwrap_or(0.0);
-    let extinction = numbers[0];
-    if !(extinction >= 0.0 && extinction.is_finite()) {
-        Err("extinction is not a positive number".into())
-    } else if !(0.0..=1.0).contains(&albedo) {
-        Err("albedo is not in [0, 1]".into())
-    } else if !(-1.0..1.0).contains(&anisotropy) || anisotropy == -1.0 {
-        Err("g is not between -1 and 1".into())
-    } else {
-        Ok(Medium {
-            scattering: Vec3::splat(extinction * albedo),
-            absorption: Vec3::splat(extinction * (1.0 - albedo)),
-            anisotropy,
-            region: None,
-        })
-    }
-}
-
-/// The largest width and height.
-const LARGEST: u32 = 1 << 16;
-/// The most pixels: a pixel takes 64 bytes while a frame is rendered.
-const MOST_PIXELS: u64 = 1 << 27;
+/// Rows of a picture whose size is not given.
+const HEIGHT: u32 = 720;
 
 /// Pictures are OpenEXR files, and their previews are named after them.
 fn pictures(pattern: &str) -> Result<FrameNames, String> {
@@ -149,25 +117,16 @@ fn pictures(pattern: &str) -> Result<FrameNames, String> {
     FrameNames::new(pattern).map_err(|error| error.to_string())
 }
 
-fn resolution(text: &str) -> Result<(u32, u32), String> {
-    let sides = text.split_once(['x', 'X']);
-    let parsed = sides.and_then(|(w, h)| Some((w.parse().ok()?, h.parse().ok()?)));
-    match parsed {
-        Some((w, h)) if u64::from(w) * u64::from(h) > MOST_PIXELS => {
-            Err(format!("{w}x{h} is more than {MOST_PIXELS} pixels"))
-        }
-        Some((w, h)) if (1..=LARGEST).contains(&w) && (1..=LARGEST).contains(&h) => Ok((w, h)),
-        _ => Err(format!("write WIDTHxHEIGHT, such as 1280x720, each from 1 to {LARGEST}")),
-    }
-}
-
 impl Arguments {
+    /// Width over height of the pictures, of a camera that asks for none.
+    pub fn aspect(&self) -> f32 {
+        self.res.map_or(ASPECT, |(width, height)| width as f32 / height as f32)
+    }
+
     /// The knobs, for a camera of some aspect.
     pub fn settings(&self, aspect: Option<f32>) -> RenderSettings {
-        let (width, height) = self.res.unwrap_or_else(|| {
-            let wide = 720.0 * aspect.unwrap_or(16.0 / 9.0);
-            ((wide.round() as u32).clamp(1, LARGEST), 720)
-        });
+        let (width, height) =
+            self.res.unwrap_or_else(|| option::size_of(aspect.unwrap_or(ASPECT), HEIGHT));
         RenderSettings {
             width,
             height,

@@ -5,7 +5,7 @@ mod progress;
 mod shot;
 
 use arguments::Arguments;
-use candelabra::pipeline::TreeError;
+use candelabra::pipeline::{TreeError, ViewError};
 use candelabra::render::frame_names::FrameNamesError;
 use clap::Parser;
 use std::process::ExitCode;
@@ -30,11 +30,16 @@ fn main() -> ExitCode {
             eprintln!("candelabra-render: {error:#}");
             ExitCode::from(match error {
                 error if is_bad_tree(&error) => BAD_TREE,
-                error if error.is::<FrameNamesError>() => USAGE,
+                error if is_usage(&error) => USAGE,
                 _ => FAILED,
             })
         }
     }
+}
+
+/// Whether options that are right by themselves are not right together.
+fn is_usage(error: &anyhow::Error) -> bool {
+    error.is::<FrameNamesError>() || error.downcast_ref().is_some_and(ViewError::is_usage)
 }
 
 /// Whether the tree file itself is at fault; not one that is absent.

@@ -10,8 +10,11 @@ use candelabra::render::exr::{ExrOptions, read_metadata, write_exr};
 use candelabra::render::frames::Frames;
 use candelabra::render::png::{exposure_for, write_png};
 use candelabra::render::{RenderDelegate, RenderSettings};
-use candelabra::scene::{Camera, Scene};
+use candelabra::scene::{Camera, Node, Scene};
+use candelabra::store::check_writable;
 use serde::{Deserialize, Serialize};
+use serde_json::json;
+use std::io;
 use std::path::Path;
 use std::str::FromStr;
 use std::time::Instant;
@@ -20,6 +23,9 @@ use std::time::Instant;
 pub fn render(arguments: &Arguments) -> Result<usize> {
     if let Some(threads) = arguments.threads {
         rayon::ThreadPoolBuilder::new().num_threads(threads.into()).build_global()?;
+    }
+    if let Some(frames) = &arguments.frames {
+        check_names(arguments, frames)?;
     }
     let mut scene = pipeline::load_scene(&arguments.scene)?;
     pipeline::force_lights(&mut scene, &arguments.force_light)
@@ -32,11 +38,18 @@ pub fn render(arguments: &Arguments) -> Result<usize> {
     }
     let frames = match &arguments.frames {
         Some(frames) => frames.clone(),
-        None => Frames::from_str(&pipeline::frames_of(&scene)[0].to_string())?,
+        None => {
+            let first = Frames::from_str(&pipeline::frames_of(&scene)[0].to_string())?;
+            check_names(arguments, &first)?;
+            first
+        }
     };
-    arguments.output.check(&frames)?;
+    let look = pipeline::look(&mut scene, &arguments.view, arguments.aspect())?;
+    if let Some(note) = &look.note {
+        eprintln!("note: {note}");
+    }
+    let camera = look.camera;
     refuse_to_overwrite(arguments, &scene, &frames)?;
-    let camera = pipeline::find_camera(&scene, arguments.camera.as_deref())?.clone();
     let emitters = Emitters::collect(&scene);
     match &arguments.tree {
         Some(path) => {
@@ -69,6 +82,30 @@ fn refuse_to_overwrite(arguments: &Arguments, scene: &Scene, frames: &Frames) ->
     Ok(())
 }
 
+/// Refuses a shot whose frames would share a name, or of which none can be written. A shot to be resumed
+/// may be done, and then nothing has to be written.
+fn check_names(arguments: &Arguments, frames: &Frames) -> Result<()> {
+    arguments.output.check(frames)?;
+    if arguments.resume {
+        return Ok(());
+    }
+    let mut checks = frames.as_slice().iter().map(|&frame| check_outputs(arguments, frame));
+    let first = checks.next().expect("there is a frame");
+    if first.is_err() && !checks.any(|check| check.is_ok()) {
+        first?;
+    }
+    Ok(())
+}
+
+/// Makes sure that a frame's picture, and its preview if there is to be one, can be written.
+fn check_outputs(arguments: &Arguments, frame: i32) -> io::Result<()> {
+    let picture = arguments.output.path(frame);
+    if arguments.png {
+        check_writable(&picture.with_extension("png"))?;
+    }
+    check_writable(&picture)
+}
+
 fn same_file(a: &Path, b: &Path) -> bool {
     matches!((a.canonicalize(), b.canonicalize()), (Ok(a), Ok(b)) if a == b)
 }
@@ -86,6 +123,7 @@ struct Stamp {
     frame: i32,
     fingerprint: String,
     settings: serde_json::Value,
+    camera: serde_json::Value,
 }
 
 const SOFTWARE: &str = concat!("candelabra-render ", env!("CARGO_PKG_VERSION"));
@@ -95,7 +133,7 @@ impl Stamp {
     /// the scene and the algorithm, and its own fingerprint is of all frames that it was built for.
     fn new(
         content: &[[u8; 32]; 2],
-        camera: &Camera,
+        (camera, place): (&Camera, &[&Node]),
         arguments: &Arguments,
         settings: &RenderSettings,
         frame: i32,
@@ -106,12 +144,16 @@ impl Stamp {
         let (float, sound) = (arguments.float, !arguments.no_verify);
         let (fog, forced) = (&arguments.fog, &arguments.force_light);
         let rest = format!(
-            "{SOFTWARE} {ALGORITHM_VERSION} {camera:?} {fog:?} {forced:?} {float} {sound} \
+            "{SOFTWARE} {ALGORITHM_VERSION} {camera:?} {place:?} {fog:?} {forced:?} {float} {sound} \
              {settings} {frame}"
         );
         hasher.update(rest.as_bytes());
         let fingerprint = hasher.finalize().to_hex().to_string();
-        Ok(Stamp { software: SOFTWARE.into(), frame, fingerprint, settings })
+        let camera = json!({
+            "path": place[0].path,
+            "exposure_scale": camera.exposure_scale,
+        });
+        Ok(Stamp { software: SOFTWARE.into(), frame, fingerprint, settings, camera })
     }
 
     /// Whether a picture is there, whole, and rendered from the same.
@@ -132,7 +174,8 @@ fn render_frames<D: AsRef<[u8]> + Sync>(
 ) -> Result<usize> {
     let settings = arguments.settings(camera.aspect);
     let content = [pipeline::scene_fingerprint(scene)?, program_fingerprint()];
-    let stamp_of = |frame| Stamp::new(&content, &camera, arguments, &settings, frame);
+    let place = place_of(scene, &camera);
+    let stamp_of = |frame| Stamp::new(&content, (&camera, &place), arguments, &settings, frame);
     let height = settings.height;
     let bar = Bar::new(frames.as_slice().len(), height);
     // Prepared when the first frame needs it: a finished shot resumes at once.
@@ -148,10 +191,14 @@ fn render_frames<D: AsRef<[u8]> + Sync>(
             continue;
         }
         bar.frame(frame);
-        let delegate = delegate.get_or_insert_with(|| {
-            RenderDelegate::new(scene, emitters, tree, camera.clone(), settings.clone())
-        });
-        match render_frame(delegate, arguments, &stamp, &path, &bar, &mut exposure) {
+        let rendered =
+            check_outputs(arguments, frame).map_err(anyhow::Error::from).and_then(|()| {
+                let delegate = delegate.get_or_insert_with(|| {
+                    RenderDelegate::new(scene, emitters, tree, camera.clone(), settings.clone())
+                });
+                render_frame(delegate, arguments, &stamp, &path, &bar, &mut exposure)
+            });
+        match rendered {
             Ok(line) => bar.line(&line),
             Err(error) => {
                 failed += 1;
@@ -161,6 +208,13 @@ fn render_frames<D: AsRef<[u8]> + Sync>(
         }
     }
     Ok(failed)
+}
+
+/// The camera's node, and all above it.
+fn place_of<'a>(scene: &'a Scene, camera: &Camera) -> Vec<&'a Node> {
+    let node = |number: u32| &scene.nodes[number as usize];
+    let above = |node_: &&'a Node| node_.parent.map(node);
+    std::iter::successors(Some(node(camera.node)), above).collect()
 }
 
 /// Renders and writes one frame; returns the line that tells what was done.

@@ -6,7 +6,7 @@ use candelabra::light_tree::LightTree;
 use candelabra::page::counted;
 use candelabra::pipeline::{self, OpenedTree, Rebuilt, Survey, TreeError};
 use candelabra::render::frames::Frames;
-use candelabra::store::{AlignedBytes, write_atomically};
+use candelabra::store::{AlignedBytes, check_writable, write_atomically};
 use clap::Args;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -44,6 +44,10 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         rayon::ThreadPoolBuilder::new().num_threads(threads.into()).build_global()?;
     }
     let output = arguments.output.clone().unwrap_or(arguments.scene.with_extension("ltree"));
+    // An output that is there may be up to date, and need no writing.
+    if !output.is_file() {
+        check_writable(&output)?;
+    }
     let mut out = std::io::stdout().lock();
 
     let load = || {
@@ -90,6 +94,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         writeln!(out, "{}: up to date", output.display())?;
         return Ok(());
     }
+    check_writable(&output)?;
     let base = match base {
         None => before,
         Some(Ok(base)) => Some(base),

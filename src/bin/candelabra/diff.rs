@@ -2,7 +2,10 @@
 
 use crate::page;
 use anyhow::{Result, bail};
-use candelabra::diff::{DiffOptions, Side, SideError, Text, compare, compare_folders, html};
+use candelabra::diff::{
+    DiffOptions, Side, SideError, Text, compare, compare_folders, html, look_at_both,
+};
+use candelabra::pipeline::View;
 use clap::Args;
 use std::fmt::Display;
 use std::io::{self, BufWriter, StdoutLock, Write};
@@ -13,8 +16,9 @@ use std::process::ExitCode;
 /// each; or all shots of two folders, matched by name.
 ///
 /// Lights are listed by their share: of all energy or of all picks, whichever they gained or lost more
-/// of. Picks are compared where paths of a scene's first camera go, else around the lights. Prims that
-/// send no light are not compared.
+/// of. Picks are compared where paths from the camera of a scene go, of two trees around the lights. A
+/// scene without a camera is seen as the other version is, or as by --fit. Prims that send no light are
+/// not compared.
 ///
 /// Ends with 0 if they are the same, 1 if they differ and 2 if they cannot be compared.
 #[derive(Args)]
@@ -32,6 +36,8 @@ pub struct Arguments {
     /// Write a page too, with pictures of the lights and of what the camera sees; not of folders
     #[arg(long, value_name = "FILE")]
     html: Option<PathBuf>,
+    #[command(flatten)]
+    view: View,
     /// Threads; as many as there are cores if not given
     #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
@@ -48,15 +54,24 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
         rayon::ThreadPoolBuilder::new().num_threads(threads.into()).build_global()?;
     }
     let Arguments { before, after, .. } = arguments;
+    if let Some(page) = &arguments.html {
+        page::check(page, &[before, after])?;
+    }
     match [before, after].map(|path| path.is_dir()) {
         [false, false] => {
             let (before, after) = rayon::join(|| Side::open(before), || Side::open(after));
-            let (before, after) = (before?, after?);
+            let (mut before, mut after) = (before?, after?);
+            if before.scene().is_none() && after.scene().is_none() && !arguments.view.is_default() {
+                bail!("{}: is a tree; a view is one of scenes", arguments.before.display());
+            }
+            if let Some(note) = look_at_both(&mut before, &mut after, &arguments.view)? {
+                eprintln!("note: {note}");
+            }
             let for_page = arguments.html.is_some();
             let options = DiffOptions { unchanged: for_page, heat: for_page };
             let diff = compare(&before, &after, &options)?;
             if let Some(page) = &arguments.html {
-                page::write(page, &html(&diff), &[&arguments.before, &arguments.after])?;
+                page::write(page, &html(&diff))?;
             }
             print(arguments, |out| diff.write_json(out), |most| Text { of: &diff, most })?;
             Ok(if diff.is_same() { ExitCode::SUCCESS } else { DIFFERENT.into() })
@@ -65,7 +80,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
             bail!("{}: a page compares two files, and these are folders", before.display())
         }
         [true, true] => {
-            let diff = compare_folders(before, after)?;
+            let diff = compare_folders(before, after, &arguments.view)?;
             print(arguments, |out| diff.write_json(out), |most| Text { of: &diff, most })?;
             Ok(match (diff.has_trouble(), diff.is_same()) {
                 (true, _) => TROUBLE.into(),

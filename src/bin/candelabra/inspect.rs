@@ -34,6 +34,9 @@ pub struct Arguments {
 }
 
 pub fn run(arguments: &Arguments) -> Result<()> {
+    if let Some(page) = &arguments.html {
+        page::check(page, &[&arguments.file])?;
+    }
     if pipeline::is_tree_file(&arguments.file) {
         let tree = pipeline::open_tree(&arguments.file, true)?;
         show_tree(arguments, &tree, None)
@@ -74,7 +77,7 @@ fn show_tree<D: AsRef<[u8]>>(
         return Ok(());
     }
     let Some(page) = &arguments.html else { return print_tree(&mut out, &report) };
-    page::write(page, &inspect::html(tree, &report, scene), &[&arguments.file])
+    page::write(page, &inspect::html(tree, &report, scene))
 }
 
 fn print_json(report: &impl Serialize) -> Result<()> {
@@ -89,7 +92,13 @@ fn print_scene(out: &mut impl Write, report: &SceneReport) -> Result<()> {
     writeln!(out, "  instances   {} with {} triangles", report.instances, report.placed_triangles)?;
     writeln!(out, "  materials   {}", report.materials)?;
     for (i, camera) in report.cameras.iter().enumerate() {
-        writeln!(out, "  camera {i}    {}, {:.1} degrees high", camera.path, camera.height_deg)?;
+        let height = match (camera.height_deg, camera.height_m) {
+            (Some(degrees), _) => format!("{degrees:.1} degrees high"),
+            (None, metres) => {
+                format!("orthographic, {} m high", Short(metres.unwrap_or(0.0).into()))
+            }
+        };
+        writeln!(out, "  camera {i}    {}, {height}", camera.path)?;
     }
     if let Some(frames) = report.frames {
         let rate = report.frames_per_second;

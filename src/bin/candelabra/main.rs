@@ -9,6 +9,7 @@ mod race;
 mod shot;
 mod verify;
 
+use candelabra::pipeline::ViewError;
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
 
@@ -36,6 +37,9 @@ enum Command {
     Verify(verify::Arguments),
 }
 
+/// Usage; mostly said by clap.
+const USAGE: u8 = 2;
+
 fn main() -> ExitCode {
     let command = Arguments::parse().command;
     let done = |()| ExitCode::SUCCESS;
@@ -55,6 +59,7 @@ fn main() -> ExitCode {
             eprintln!("candelabra: {error:#}");
             match command {
                 Command::Diff(_) => diff::TROUBLE.into(),
+                _ if error.downcast_ref().is_some_and(ViewError::is_usage) => USAGE.into(),
                 _ => ExitCode::FAILURE,
             }
         }

@@ -3,6 +3,7 @@
 use crate::shot::Shot;
 use anyhow::Result;
 use candelabra::measure::{ProbeOptions, ProbeReport, at_probes};
+use candelabra::pipeline::{ASPECT, option};
 use candelabra::render::{RenderDelegate, RenderSettings, SplitBy};
 use clap::Args;
 use std::io::Write;
@@ -15,7 +16,7 @@ pub struct Arguments {
     #[arg(long, default_value_t = 128, value_parser = clap::value_parser!(u32).range(1..=1 << 20))]
     probes: u32,
     /// Knobs of splitting to try
-    #[arg(long, value_delimiter = ',', default_values_t = [0.1, 0.2, 0.3, 0.5])]
+    #[arg(long, value_delimiter = ',', default_values_t = [0.1, 0.2, 0.3, 0.5], value_parser = option::knob)]
     split: Vec<f32>,
     /// At most so many lights at a point
     #[arg(long, default_value_t = RenderSettings::default().max_lights, value_parser = clap::value_parser!(u32).range(1..))]
@@ -32,14 +33,14 @@ pub struct Arguments {
 }
 
 pub fn run(arguments: &Arguments) -> Result<()> {
-    let shot = Shot::prepare(&arguments.shot)?;
+    let shot = Shot::prepare(&arguments.shot, ASPECT)?;
     let settings = RenderSettings { width: 1024, height: 1024, ..Default::default() };
     let delegate =
         RenderDelegate::new(&shot.scene, &shot.emitters, &shot.tree, shot.camera.clone(), settings);
     let options = ProbeOptions {
         probes: arguments.probes,
         visibility: arguments.visibility,
-        knobs: arguments.split.iter().map(|knob| knob.clamp(0.0, 1.0)).collect(),
+        knobs: arguments.split.clone(),
         max_lights: arguments.max_lights,
         seed: arguments.seed,
     };

@@ -3,6 +3,7 @@
 use crate::shot::Shot;
 use anyhow::Result;
 use candelabra::measure::{Entrant, RaceOptions, race};
+use candelabra::pipeline::option;
 use candelabra::render::{LightStrategy, RenderDelegate, RenderSettings, SplitBy};
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -17,7 +18,7 @@ pub struct Arguments {
     #[arg(required = true, value_parser = way)]
     ways: Vec<Way>,
     /// Size of the picture in pixels, WxH
-    #[arg(long, default_value = "320x180", value_parser = size)]
+    #[arg(long, default_value = "320x180", value_parser = option::size)]
     res: (u32, u32),
     /// Bounces of light to the eye
     #[arg(long, default_value_t = 1)]
@@ -54,31 +55,20 @@ fn way(text: &str) -> Result<Way, String> {
     let read = |text: &str| serde_json::from_value(serde_json::Value::String(text.into()));
     let strategy = read(parts.next().unwrap_or_default()).map_err(|_| wrong())?;
     let split = parts.next().map_or(Ok(RenderSettings::default().split), |text| {
-        text.parse::<f32>().map_err(|_| wrong())
+        option::knob(text).map_err(|help| format!("{}; for SPLIT, {help}", wrong()))
     })?;
-    if !(0.0..=1.0).contains(&split) {
-        return Err(format!("{}; SPLIT is from 0 to 1", wrong()));
-    }
     let read = |text: &str| serde_json::from_value(serde_json::Value::String(text.into()));
     let split_by =
         parts.next().map_or(Ok(SplitBy::Variance), |text| read(text).map_err(|_| wrong()))?;
     Ok(Way { name: text.into(), strategy, split, split_by, samples })
 }
 
-fn size(text: &str) -> Result<(u32, u32), String> {
-    let sides = text.split_once('x');
-    let parsed = sides.and_then(|(w, h)| Some((w.parse().ok()?, h.parse().ok()?)));
-    parsed
-        .filter(|&(w, h): &(u32, u32)| (1..=8192).contains(&w) && (1..=8192).contains(&h))
-        .ok_or_else(|| "write WIDTHxHEIGHT, such as 320x180".into())
-}
-
 pub fn run(arguments: &Arguments) -> Result<()> {
     if let Some(threads) = arguments.threads {
         rayon::ThreadPoolBuilder::new().num_threads(threads.into()).build_global()?;
     }
-    let shot = Shot::prepare(&arguments.shot)?;
     let (width, height) = arguments.res;
+    let shot = Shot::prepare(&arguments.shot, width as f32 / height as f32)?;
     let base = RenderSettings {
         width,
         height,

@@ -3,22 +3,22 @@
 use anyhow::{Context, Result, anyhow};
 use candelabra::emitter::Emitters;
 use candelabra::light_tree::LightTree;
-use candelabra::pipeline;
+use candelabra::pipeline::{self, Look, View};
 use candelabra::scene::{Camera, Scene};
 use candelabra::store::AlignedBytes;
 use clap::Args;
 use std::path::PathBuf;
 
 #[derive(Args)]
+#[group(id = "shot")]
 pub struct Arguments {
     /// The scene: .gltf, .glb or .obj
     scene: PathBuf,
     /// The frame; the first of the scene if not given
     #[arg(long, allow_negative_numbers = true)]
     frame: Option<i32>,
-    /// Camera, by prim path or number; the first if not given
-    #[arg(long)]
-    camera: Option<String>,
+    #[command(flatten)]
+    view: View,
 }
 
 /// A scene with the tree of one frame.
@@ -31,10 +31,14 @@ pub struct Shot {
 }
 
 impl Shot {
-    pub fn prepare(arguments: &Arguments) -> Result<Shot> {
-        let scene = pipeline::load_scene(&arguments.scene)?;
+    /// Reads a scene and builds its tree. `aspect` is that of the picture to come.
+    pub fn prepare(arguments: &Arguments, aspect: f32) -> Result<Shot> {
+        let mut scene = pipeline::load_scene(&arguments.scene)?;
         let name = || arguments.scene.display().to_string();
-        let camera = pipeline::find_camera(&scene, arguments.camera.as_deref())?.clone();
+        let Look { camera, note } = pipeline::look(&mut scene, &arguments.view, aspect)?;
+        if let Some(note) = note {
+            eprintln!("note: {note}");
+        }
         let emitters = Emitters::collect(&scene);
         let frame = arguments.frame.unwrap_or_else(|| pipeline::frames_of(&scene)[0]);
         let survey = pipeline::survey(&scene, &emitters, &[frame]).with_context(name)?;

@@ -134,7 +134,7 @@ impl Walk<'_> {
         object: &str,
     ) -> Result<(), Fault> {
         if let Some(camera) = row.camera {
-            cameras::compile(self.source, output, camera, row, node, object)?;
+            cameras::compile(self.source, output, camera, row, node, object);
         }
         fog::of_node(output, &row.extras, node, object)?;
         let lux = UsdLux::of(&row.extras, object)?;

@@ -29,6 +29,8 @@ pub(in crate::ingest::gltf) struct Beside {
     pub hidden: BTreeSet<usize>,
     /// Normal map of every material: the crate's has no `KHR_texture_transform`.
     pub normal_maps: Vec<Option<texture::Info>>,
+    /// Of every camera, in case it is orthographic: the crate's cannot do without clipping planes.
+    pub magnifications: Vec<Option<Magnification>>,
     /// Channels of every animation: the crate's need a node and have no `KHR_animation_pointer`.
     pub channels: Vec<Vec<Channel>>,
 }
@@ -39,6 +41,15 @@ pub(in crate::ingest::gltf) struct Transform {
     pub translation: Option<[Real; 3]>,
     pub rotation: Option<[Real; 4]>,
     pub scale: Option<[Real; 3]>,
+}
+
+/// What an orthographic camera sees, from the middle to the edge.
+#[derive(Clone, Copy, Deserialize)]
+pub(in crate::ingest::gltf) struct Magnification {
+    #[serde(default)]
+    pub xmag: Real,
+    #[serde(default)]
+    pub ymag: Real,
 }
 
 #[derive(Deserialize)]
@@ -102,6 +113,17 @@ impl Beside {
         Ok(())
     }
 
+    pub(super) fn camera(&mut self, row: &mut Row) -> Prepared {
+        known("type", row.get("type"), VALID_CAMERA_TYPES)?;
+        self.magnifications.push(take(row, "orthographic")?);
+        // glTF's clipping planes are not read: see `carriers.md`.
+        if let Some(lens) = row.get_mut("perspective").and_then(Value::as_object_mut) {
+            lens.remove("zfar");
+            lens.insert("znear".into(), json!(0));
+        }
+        Ok(())
+    }
+
     pub(super) fn animation(&mut self, row: &mut Row) -> Prepared {
         let channels = row.insert("channels".into(), json!([])).ok_or("has no channels")?;
         self.channels.push(from_value(channels)?);
@@ -116,17 +138,6 @@ pub(super) fn accessor(row: &mut Row) -> Prepared {
     known("type", row.get("type"), VALID_ACCESSOR_TYPES)?;
     let indices = row.get("sparse").and_then(|sparse| sparse.pointer("/indices/componentType"));
     known("component type of sparse indices", indices, VALID_INDEX_TYPES)
-}
-
-pub(super) fn camera(row: &mut Row) -> Prepared {
-    known("type", row.get("type"), VALID_CAMERA_TYPES)?;
-    // Neither orthographic projections nor clipping planes are read.
-    row.remove("orthographic");
-    if let Some(lens) = row.get_mut("perspective").and_then(Value::as_object_mut) {
-        lens.remove("zfar");
-        lens.insert("znear".into(), json!(0));
-    }
-    Ok(())
 }
 
 pub(super) fn light(row: &mut Row) -> Prepared {

@@ -17,7 +17,7 @@ pub(in crate::ingest::gltf) struct AssetUsd {
     pub end_time_code: Option<Real>,
 }
 
-/// `extras.usdCamera`: the lens.
+/// `extras.usdCamera`: the lens, the exposure and the clipping planes.
 #[derive(Deserialize)]
 pub(in crate::ingest::gltf) struct UsdCamera {
     #[serde(default, rename = "fStop")]
@@ -28,6 +28,10 @@ pub(in crate::ingest::gltf) struct UsdCamera {
     pub focus_distance_m: Real,
     #[serde(default, rename = "filmOffset")]
     pub film_offset: [Real; 2],
+    #[serde(rename = "exposureScale")]
+    pub exposure_scale: Option<Real>,
+    #[serde(rename = "clippingRange_m")]
+    pub clipping_range_m: Option<[Real; 2]>,
 }
 
 /// `extras.usdLux`: the light at a node.

@@ -90,7 +90,7 @@ impl Document {
             textures: table(json, "textures", "texture", |_| Ok(()))?,
             images: table(json, "images", "image", |_| Ok(()))?,
             samplers: table(json, "samplers", "sampler", |_| Ok(()))?,
-            cameras: table(json, "cameras", "camera", beside::camera)?,
+            cameras: table(json, "cameras", "camera", |row| beside.camera(row))?,
             animations: table(json, "animations", "animation", |row| beside.animation(row))?,
             skins: table(json, "skins", "skin", |_| Ok(()))?,
             ..Root::default()

@@ -1,0 +1,99 @@
+//! A camera carried from one scene into another, with the nodes that it stands at.
+
+use crate::scene::{Camera, Channel, Interpolation, Keys, Node, Scene, Timeline};
+use std::ops::Mul;
+
+/// Adds a camera's node and all above it to another scene, and returns the camera there. It stands at
+/// every frame where it stood, whatever seconds the two scenes give to a frame; and the other scene has
+/// no more frames than before.
+pub fn carry_camera(from: &Scene, camera: &Camera, into: &mut Scene) -> Camera {
+    let frames = super::frames_of(into);
+    into.timeline.last_frame = frames.last().map(|&last| f64::from(last));
+    let mut chain = vec![camera.node];
+    while let Some(parent) = from.nodes[chain[chain.len() - 1] as usize].parent {
+        chain.push(parent);
+    }
+    let mut parent = None;
+    for &number in chain.iter().rev() {
+        let Node { path, local, channels, .. } = from.nodes[number as usize].clone();
+        let path = format!("{}:{path}", from.source.display());
+        let mut node = Node { path, parent, local, channels };
+        if from.timeline != into.timeline {
+            node.channels.iter_mut().for_each(|c| retime(c, &from.timeline, &into.timeline));
+        }
+        parent = Some(into.nodes.len() as u32);
+        into.nodes.push(node);
+    }
+    Camera { node: into.nodes.len() as u32 - 1, ..camera.clone() }
+}
+
+fn retime(channel: &mut Channel, from: &Timeline, into: &Timeline) {
+    match channel {
+        Channel::Translation(keys) | Channel::Scale(keys) => retime_keys(keys, from, into),
+        Channel::Rotation(keys) => retime_keys(keys, from, into),
+    }
+}
+
+/// Moves keys from the seconds of one timeline to those of another, frame by frame.
+fn retime_keys<T>(keys: &mut Keys<T>, from: &Timeline, into: &Timeline)
+where
+    T: Copy + Mul<f32, Output = T>,
+{
+    let frame = |seconds: f64| from.first_frame + seconds * from.frames_per_second;
+    for time in &mut keys.times_s {
+        *time = into.seconds_at(frame(f64::from(*time))) as f32;
+    }
+    if keys.interpolation == Interpolation::Cubic {
+        // Tangents are per second.
+        let slower = (into.frames_per_second / from.frames_per_second) as f32;
+        for tangents in keys.values.chunks_exact_mut(3) {
+            tangents[0] = tangents[0] * slower;
+            tangents[2] = tangents[2] * slower;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::Trs;
+    use glam::Vec3;
+
+    #[test]
+    fn a_camera_moves_as_it_did_frame_by_frame() {
+        for interpolation in [Interpolation::Linear, Interpolation::Step, Interpolation::Cubic] {
+            let keys = |times: &[f32]| {
+                let per_key = if interpolation == Interpolation::Cubic { 3 } else { 1 };
+                let value = |i: usize| Vec3::new((i * i) as f32, 1.0, -(i as f32));
+                let values = (0..times.len() * per_key).map(value).collect();
+                Channel::Translation(Keys { times_s: times.into(), values, interpolation })
+            };
+            let mut from = Scene { source: "cam.glb".into(), ..Default::default() };
+            from.timeline =
+                Timeline { first_frame: 1001.0, frames_per_second: 25.0, last_frame: None };
+            from.nodes = vec![
+                Node::fixed("/other", None, Trs::default()),
+                Node::fixed("/rig", None, Trs::default()),
+                Node::fixed("/rig/eye", Some(1), Trs::default()),
+            ];
+            from.nodes[1].channels = vec![keys(&[0.0, 2.0])];
+            from.nodes[2].channels = vec![keys(&[0.0, 0.4, 4.0])];
+            let mut into = Scene::default();
+            into.timeline.first_frame = 990.0;
+            into.nodes = vec![Node::fixed("/rig", None, Trs::default())];
+            let frames = super::super::frames_of(&into);
+
+            let camera = carry_camera(&from, &Camera::perspective(2, 0.5), &mut into);
+            assert_eq!(into.nodes.len(), 3);
+            assert_eq!(into.nodes[2].path, "cam.glb:/rig/eye");
+            assert_eq!(super::super::frames_of(&into), frames, "the shot is no longer than it was");
+            for frame in [1000.0, 1001.0, 1005.5, 1020.0, 1100.0, 1200.0] {
+                let place = |scene: &Scene, node: u32| {
+                    scene.pose_at(scene.timeline.seconds_at(frame)).world(node).translation
+                };
+                let (was, is) = (place(&from, 2), place(&into, camera.node));
+                assert!((was - is).length() < 1e-3 * (1.0 + was.length()), "{frame}: {was} {is}");
+            }
+        }
+    }
+}
