@@ -35,6 +35,8 @@ pub struct LightSample {
     pub pdf: Option<f32>,
     /// Where on a mesh light: its coverage there, which a material may lower, is not in `radiance`.
     pub on_mesh: Option<MeshPlace>,
+    /// Whether reflected rays meet the light.
+    pub is_seen: bool,
 }
 
 /// A place on an instance of a mesh.
@@ -79,6 +81,7 @@ impl<'a> PosedEmitters<'a> {
                     radiance,
                     pdf: Some(found.pdf),
                     on_mesh: Some(MeshPlace { instance: row, triangle: number, barycentric }),
+                    is_seen: self.scene.instances[row as usize].visibility.reflections,
                 })
             }
             EmitterPlace::Light(row) => self.sample_light(row, receiver, u),
@@ -108,6 +111,7 @@ impl<'a> PosedEmitters<'a> {
                     radiance: rgb * shaped(shaping, found.direction),
                     pdf: Some(found.pdf),
                     on_mesh: None,
+                    is_seen: light.visibility.reflections,
                 }
             }
             LightKind::Distant { .. } | LightKind::Dome { .. } => return None,
@@ -143,6 +147,7 @@ impl<'a> PosedEmitters<'a> {
             radiance,
             pdf: None,
             on_mesh: None,
+            is_seen: false,
         })
     }
 

@@ -13,7 +13,7 @@ mod fresh;
 mod look;
 mod survey;
 
-pub use build::{Rebuilt, build_tree, rebuild_tree};
+pub use build::{Rebuilt, build_tree, origin_of, rebuild_tree};
 pub use camera::{NoCamera, find_camera};
 pub use content::scene_fingerprint;
 pub use forced::{NoLightThere, force_lights};

@@ -152,7 +152,7 @@ impl Integrator<'_> {
         let lost = -(-extinction * segment.length).exp_m1();
         let wanted = Wanted::Along(segment, lost / extinction);
         let mut sum = Rgb::ZERO;
-        let PathScratch { picks, stats } = scratch;
+        let PathScratch { picks, stats, .. } = scratch;
         self.picker.pick(&wanted, u_pick, salt, picks, |pick| {
             stats.light_picks += 1;
             let place = another(Vec2::new(u_place, 0.0), salt, pick.light).x;

@@ -88,6 +88,8 @@ struct Stamp {
     settings: serde_json::Value,
 }
 
+/// Preparations that take less, in seconds, are not worth a line.
+const LEAST_TOLD_S: f64 = 0.1;
 const SOFTWARE: &str = concat!("candelabra-render ", env!("CARGO_PKG_VERSION"));
 
 impl Stamp {
@@ -147,10 +149,18 @@ fn render_frames<D: AsRef<[u8]> + Sync>(
             bar.skip(height);
             continue;
         }
-        bar.frame(frame);
         let delegate = delegate.get_or_insert_with(|| {
-            RenderDelegate::new(scene, emitters, tree, camera.clone(), settings.clone())
+            bar.preparing();
+            let started = Instant::now();
+            let delegate =
+                RenderDelegate::new(scene, emitters, tree, camera.clone(), settings.clone());
+            let seconds = started.elapsed().as_secs_f64();
+            if seconds >= LEAST_TOLD_S {
+                bar.line(&format!("rays prepared in {seconds:.2} s"));
+            }
+            delegate
         });
+        bar.frame(frame);
         match render_frame(delegate, arguments, &stamp, &path, &bar, &mut exposure) {
             Ok(line) => bar.line(&line),
             Err(error) => {
