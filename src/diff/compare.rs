@@ -13,6 +13,7 @@ use super::side::{Side, SideError, Surveyed};
 use super::totals::{Tally, Totals};
 use super::{Diff, SideName};
 use crate::light_tree::LightTree;
+use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 use std::collections::HashMap;
 
@@ -53,9 +54,15 @@ pub fn compare(before: &Side, after: &Side, options: &DiffOptions) -> Result<Dif
     let (tree_before, tree_after) =
         rayon::join(|| sides[0].tree(&mut room_before), || sides[1].tree(&mut room_after));
     let trees = [&tree_before, &tree_after];
-    let (picking, moved) = compare_picking(sides, trees, lights, &pairs);
-    let describer = Describer::new(scenes, trees);
-    let apart = scenes.map_or_else(HashMap::new, |scenes| apart(scenes, &pairs.changed));
+    let origins = [before, after].map(Side::origin);
+    let shift = (origins[1] - origins[0]).as_vec3();
+    let (picking, moved) = match shift == Vec3::ZERO {
+        true => compare_picking(sides, trees, lights, &pairs),
+        // No point is among the lights of both.
+        false => (None, vec![0.0; pairs.count]),
+    };
+    let describer = Describer::new(scenes, trees, shift);
+    let apart = scenes.map_or_else(HashMap::new, |scenes| apart(scenes, &pairs.changed, shift));
     let weigher = Weigher::new(trees, tallies, &moved, &apart);
     let found = pairs.changed.par_iter().map(|pair| weigher.change(pair, &describer));
     let mut changes: Vec<Change> = found.flatten().collect();
@@ -68,7 +75,7 @@ pub fn compare(before: &Side, after: &Side, options: &DiffOptions) -> Result<Dif
     let marked = if options.unchanged { pairs.unchanged.as_slice() } else { &[] };
     let heat = scenes.filter(|_| options.heat).and_then(|scenes| heat::map(scenes, trees));
     let [before, after] = names;
-    Ok(Diff {
+    let diff = Diff {
         before,
         after,
         totals: totals(tallies, &changes, pairs.count),
@@ -76,7 +83,25 @@ pub fn compare(before: &Side, after: &Side, options: &DiffOptions) -> Result<Dif
         changes,
         unchanged: marked.par_iter().filter_map(mark).collect(),
         heat,
-    })
+    };
+    Ok(in_world(diff, origins[0]))
+}
+
+/// What is shown, with all positions in the world of the files.
+fn in_world(mut diff: Diff, origin: DVec3) -> Diff {
+    let move_out = |at: &mut [f32; 3]| {
+        *at = (Vec3::from(*at).as_dvec3() + origin).as_vec3().to_array();
+    };
+    for change in &mut diff.changes {
+        let cards = [&mut change.before, &mut change.after];
+        let places = cards.into_iter().flatten().filter_map(|card| card.place.as_mut());
+        places.for_each(|place| move_out(&mut place.center_m));
+    }
+    diff.unchanged.iter_mut().for_each(|mark| move_out(&mut mark.center_m));
+    if let Some(picking) = &mut diff.picking {
+        move_out(&mut picking.worst_at_m);
+    }
+    diff
 }
 
 /// Nothing differs.

@@ -10,6 +10,7 @@ use crate::light_tree::LightTree;
 use crate::pipeline::{self, OpenedTree, TreeError, ViewError};
 use crate::scene::{Camera, Scene};
 use crate::store::AlignedBytes;
+use glam::DVec3;
 use std::path::{Path, PathBuf};
 
 /// A version to be compared.
@@ -110,6 +111,14 @@ impl Side {
         match &mut self.content {
             Content::Tree(_) => None,
             Content::Scene(scene) => Some(scene),
+        }
+    }
+
+    /// Where the origin of its positions is, metres.
+    pub(super) fn origin(&self) -> DVec3 {
+        match &self.content {
+            Content::Tree(tree) => pipeline::origin_of(tree),
+            Content::Scene(scene) => scene.origin,
         }
     }
 

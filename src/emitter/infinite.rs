@@ -7,7 +7,7 @@ use super::dome::{Dome, DomeSample};
 use crate::math::color::{Rgb, luminance};
 use crate::math::directions::aim;
 use crate::math::{Frame, warp};
-use crate::scene::{LightKind, Pose, Scene};
+use crate::scene::{LightKind, Pose, Scene, Visibility};
 use glam::{Vec2, Vec3};
 use std::f32::consts::PI;
 
@@ -17,6 +17,8 @@ pub struct InfiniteLight<'a> {
     pub light: usize,
     /// Whether it is left out of all estimates and sampled at every point.
     pub forced: bool,
+    /// Which rays meet it.
+    pub visibility: Visibility,
     kind: Kind<'a>,
 }
 
@@ -67,7 +69,8 @@ pub fn infinite_lights<'a>(scene: &'a Scene, pose: &Pose) -> Vec<InfiniteLight<'
     let lights = scene.lights.iter().enumerate();
     let found = lights.filter_map(|(light, row)| {
         let rgb = scene.rgb_of_light(light as u32, pose);
-        Some(InfiniteLight { light, forced: row.forced, kind: kind(row, rgb)? })
+        let (forced, visibility) = (row.forced, row.visibility);
+        Some(InfiniteLight { light, forced, visibility, kind: kind(row, rgb)? })
     });
     found.collect()
 }

@@ -37,6 +37,8 @@ pub struct LightSample {
     pub pdf: Option<f32>,
     /// Where on a mesh light: its coverage there, which a material may lower, is not in `radiance`.
     pub on_mesh: Option<MeshPlace>,
+    /// Whether reflected rays meet the light.
+    pub is_seen: bool,
 }
 
 /// A place on an instance of a mesh.
@@ -81,6 +83,7 @@ impl<'a> PosedEmitters<'a> {
                     radiance,
                     pdf: Some(found.pdf),
                     on_mesh: Some(MeshPlace { instance: row, triangle: number, barycentric }),
+                    is_seen: self.scene.instances[row as usize].visibility.reflections,
                 })
             }
             EmitterPlace::Light(row) => self.sample_light(row, receiver, u),
@@ -105,6 +108,7 @@ impl<'a> PosedEmitters<'a> {
                     radiance: rgb * self.profile(*shaping, light.node, found.direction.as_dvec3()),
                     pdf: Some(found.pdf),
                     on_mesh: None,
+                    is_seen: light.visibility.reflections,
                 }
             }
             LightKind::Distant { .. } | LightKind::Dome { .. } => return None,
@@ -136,6 +140,7 @@ impl<'a> PosedEmitters<'a> {
             radiance,
             pdf: None,
             on_mesh: None,
+            is_seen: false,
         })
     }
 

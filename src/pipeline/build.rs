@@ -8,7 +8,7 @@ use crate::light_tree::{
 };
 use crate::math::Similarity;
 use crate::store::AlignedBytes;
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use std::borrow::Cow;
 use std::collections::HashMap;
 
@@ -55,10 +55,13 @@ fn write(survey: &Survey, lights: &LightList, writer: LightTreeWriter) -> Rebuil
         builder.frames(survey, still, below, &forced_still);
     }
     let writer = builder.writer;
-    let meta = serde_json::json!({
+    let mut meta = serde_json::json!({
         "program": concat!("candelabra ", env!("CARGO_PKG_VERSION")),
         ALGORITHM: ALGORITHM_VERSION,
     });
+    if survey.origin != DVec3::ZERO {
+        meta[ORIGIN] = survey.origin.to_array().into();
+    }
     let (leaves, reused) = (writer.leaf_count(), writer.reused_leaf_count());
     let bytes = writer.finish(lights, &meta.to_string(), survey.fingerprint);
     Rebuilt { bytes, leaves, reused }
@@ -71,6 +74,16 @@ const ALGORITHM: &str = "algorithmVersion";
 pub(super) fn algorithm_of<D: AsRef<[u8]>>(tree: &LightTree<D>) -> Option<u32> {
     let meta: serde_json::Value = serde_json::from_str(tree.meta()).ok()?;
     meta[ALGORITHM].as_u64()?.try_into().ok()
+}
+
+/// Under which name `META` has the origin.
+const ORIGIN: &str = "origin";
+
+/// What is added to every position of a file to get that in the scene's world, metres.
+pub fn origin_of<D: AsRef<[u8]>>(tree: &LightTree<D>) -> DVec3 {
+    let meta: serde_json::Value = serde_json::from_str(tree.meta()).unwrap_or_default();
+    let origin = [0, 1, 2].map(|axis| meta[ORIGIN][axis].as_f64().unwrap_or(0.0));
+    DVec3::from(origin)
 }
 
 /// In its own space a light numbers its emitters from 0 on.

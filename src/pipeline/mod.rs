@@ -16,7 +16,7 @@ mod rig;
 mod survey;
 mod view;
 
-pub use build::{Rebuilt, build_tree, rebuild_tree};
+pub use build::{Rebuilt, build_tree, origin_of, rebuild_tree};
 pub use content::scene_fingerprint;
 pub use forced::{NoLightThere, force_lights};
 pub use frames::frames_of;

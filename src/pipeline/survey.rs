@@ -6,6 +6,7 @@ use crate::emitter::{Emitters, LightEntry, LightOverflow, LightSource, PosedEmit
 use crate::light_tree::{ALGORITHM_VERSION, LightLook, LightRow, LightSummary};
 use crate::math::Similarity;
 use crate::scene::{Pose, Scene};
+use glam::DVec3;
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -17,6 +18,8 @@ pub struct Survey {
     pub still: Group,
     /// What changes, frame by frame; empty if nothing does.
     pub frames: Vec<(i32, Group)>,
+    /// Where the origin of all these bounds is in the scene's world, metres.
+    pub origin: DVec3,
     /// What the file says of each light.
     pub lights: Vec<LightSummary>,
     /// Of all of the above, and of the algorithm that builds over it.
@@ -84,9 +87,9 @@ pub fn survey(scene: &Scene, emitters: &Emitters, frames: &[i32]) -> Result<Surv
         None => pose,
     };
     let looks = looks(&PosedEmitters { scene, emitters, pose: &pose });
-    let lights = summaries(emitters, &looks, &shared, &still, &frames);
+    let lights = summaries(scene, emitters, &looks, &shared, &still, &frames);
     let fingerprint = whole(&lights, &frames);
-    Ok(Survey { shared, still, frames, lights, fingerprint })
+    Ok(Survey { shared, still, frames, origin: scene.origin, lights, fingerprint })
 }
 
 struct Surveyor<'a> {
@@ -198,6 +201,7 @@ fn check_total(
 }
 
 fn summaries(
+    scene: &Scene,
     emitters: &Emitters,
     looks: &[LightLook],
     shared: &[SharedBounds],
@@ -217,6 +221,9 @@ fn summaries(
             false => vec![still],
         };
         let mut hasher = blake3::Hasher::new();
+        if scene.origin != DVec3::ZERO {
+            hasher.update(bytemuck::bytes_of(&scene.origin));
+        }
         let mut energy = None;
         for group in groups {
             let now = match placed_of(group, row as u32) {

@@ -187,7 +187,7 @@ impl Integrator<'_> {
         let segment = Segment { origin, direction, length };
         let wanted = Wanted::Along(segment, (lost / extinction) as f32);
         let mut sum = Rgb::ZERO;
-        let PathScratch { picks, stats } = scratch;
+        let PathScratch { picks, stats, .. } = scratch;
         self.picker.pick(&wanted, u_pick, salt, picks, |pick| {
             stats.light_picks += 1;
             let place = f64::from(another(Vec2::new(u_place, 0.0), salt, pick.light).x);

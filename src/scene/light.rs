@@ -1,6 +1,6 @@
 //! Lights that are not meshes.
 
-use super::Keys;
+use super::{Keys, Visibility};
 use crate::math::color::Rgb;
 
 /// A light at a node. A light that aims does so along the node's local -Z, through its matrix.
@@ -17,6 +17,8 @@ pub struct Light {
     pub range_m: Option<f32>,
     /// Take it out of the importance heuristic and sample it at every point.
     pub forced: bool,
+    /// Which rays meet it: a sphere; and at infinity a sun or a dome, which casts no shadow.
+    pub visibility: Visibility,
 }
 
 /// The kinds of light that are not meshes.

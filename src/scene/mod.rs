@@ -17,7 +17,8 @@
 //!
 //! Units: metres, seconds, radians; +Y is up. Emission is in the file's own photometric numbers
 //! (nits, candela, lux): radiance 1 in the file is 1 in the picture.
-//! Spaces: a mesh and a light are in their node's *local* space; [`Pose`] takes local to *world*.
+//! Spaces: a mesh and a light are in their node's *local* space; [`Pose`] takes local to *world*,
+//! whose origin is [`Scene::origin`].
 
 mod camera;
 mod light;
@@ -29,6 +30,7 @@ mod requirements;
 mod texture;
 mod timeline;
 mod values;
+mod visibility;
 
 pub use camera::{Camera, Projection};
 pub use light::{Light, LightKind, Shaping};
@@ -39,7 +41,9 @@ pub use pose::{Channel, Interpolation, Keys, Node, Pose, Trs};
 pub use requirements::Requirements;
 pub use texture::{Pixels, Texture, TextureUse, Wrap};
 pub use timeline::Timeline;
+pub use visibility::Visibility;
 
+use glam::DVec3;
 use std::path::PathBuf;
 
 /// Everything ingest found, by index. See the [module page](self).
@@ -65,6 +69,9 @@ pub struct Scene {
     pub medium: Option<Medium>,
     /// Cameras, in the file's order.
     pub cameras: Vec<Camera>,
+    /// Where the origin of poses is, in the file's world, metres: what is subtracted from every
+    /// position before it is rounded to 32 bits, and added to those that are shown.
+    pub origin: DVec3,
     /// How frame numbers map to seconds.
     pub timeline: Timeline,
     /// What the file holds and this scene does not, in words for the user; each names its object.

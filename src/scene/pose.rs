@@ -94,7 +94,7 @@ impl Pose {
             let local = node.local_at(at);
             exact.push(match node.parent {
                 Some(parent) => exact[parent as usize] * local,
-                None => local,
+                None => DAffine3 { translation: local.translation - scene.origin, ..local },
             });
         }
         let lights = scene.lights.iter().map(|light| light.values.as_ref());
@@ -125,7 +125,7 @@ impl Pose {
         self.instance_rgb.get(instance as usize).copied().flatten()
     }
 
-    /// Local to world for a node.
+    /// Local to world for a node, from [`Scene::origin`] on.
     #[inline]
     pub fn world(&self, node: u32) -> Affine3A {
         self.world[node as usize]

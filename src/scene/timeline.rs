@@ -52,7 +52,9 @@ impl Timeline {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::{Channel, Interpolation, Keys, Light, LightKind, Node, Scene, Trs};
+    use crate::scene::{
+        Channel, Interpolation, Keys, Light, LightKind, Node, Scene, Trs, Visibility,
+    };
     use glam::Vec3;
 
     const RATES: [f64; 7] = [24.0, 24000.0 / 1001.0, 23.976, 25.0, 30000.0 / 1001.0, 30.0, 60.0];
@@ -103,7 +105,14 @@ mod tests {
         let mut node = Node::fixed("/counter", None, Trs::default());
         node.channels = vec![Channel::Translation(keys.clone())];
         let kind = LightKind::Point { intensity_cd: Vec3::ONE };
-        let light = Light { node: 0, kind, values: Some(keys), range_m: None, forced: false };
+        let light = Light {
+            node: 0,
+            kind,
+            values: Some(keys),
+            range_m: None,
+            forced: false,
+            visibility: Visibility::default(),
+        };
         let timeline = Timeline { first_frame: first, frames_per_second: rate, last_frame: None };
         Scene { nodes: vec![node], lights: vec![light], timeline, ..Default::default() }
     }

@@ -126,6 +126,8 @@ struct Stamp {
     camera: serde_json::Value,
 }
 
+/// Preparations that take less, in seconds, are not worth a line.
+const LEAST_TOLD_S: f64 = 0.1;
 const SOFTWARE: &str = concat!("candelabra-render ", env!("CARGO_PKG_VERSION"));
 
 impl Stamp {
@@ -190,12 +192,25 @@ fn render_frames<D: AsRef<[u8]> + Sync>(
             bar.skip(height);
             continue;
         }
-        bar.frame(frame);
         let rendered =
             check_outputs(arguments, frame).map_err(anyhow::Error::from).and_then(|()| {
                 let delegate = delegate.get_or_insert_with(|| {
-                    RenderDelegate::new(scene, emitters, tree, camera.clone(), settings.clone())
+                    bar.preparing();
+                    let started = Instant::now();
+                    let delegate = RenderDelegate::new(
+                        scene,
+                        emitters,
+                        tree,
+                        camera.clone(),
+                        settings.clone(),
+                    );
+                    let seconds = started.elapsed().as_secs_f64();
+                    if seconds >= LEAST_TOLD_S {
+                        bar.line(&format!("rays prepared in {seconds:.2} s"));
+                    }
+                    delegate
                 });
+                bar.frame(frame);
                 render_frame(delegate, arguments, &stamp, &path, &bar, &mut exposure)
             });
         match rendered {

@@ -29,6 +29,7 @@ fn scene_of(mesh: Mesh, material: Material, scale: DVec3) -> Scene {
             values: None,
             shaping: None,
             forced: false,
+            visibility: Default::default(),
         }],
         ..Default::default()
     }
