@@ -33,14 +33,17 @@ pub(super) fn find(scene: &Scene, pose: &Pose, frames: &[i32]) -> Vec<Infinite> 
     });
     let found = lights.map(|(row, light)| {
         let rgb = scene.rgb_of_light(row as u32, pose);
-        let (moves, varies) = (moving[light.node as usize], light.values.is_some());
+        let (moves, varies) =
+            (moving[light.node as usize], light.values.as_ref().is_some_and(Keys::varies));
         let profile = profile(scene, &light.kind);
         let mut hasher = blake3::Hasher::new();
         hasher.update(&profile.pattern.to_le_bytes());
         hasher.update(&profile.half_angle_rad.unwrap_or(0.0).to_le_bytes());
         hasher.update(bytemuck::bytes_of(&rgb));
         hasher.update(bytemuck::bytes_of(&pose.world(light.node).matrix3.to_cols_array()));
-        if let Some(Keys { times_s, values, interpolation }) = &light.values {
+        if let Some(Keys { times_s, values, interpolation }) =
+            light.values.as_ref().filter(|keys| keys.varies())
+        {
             hasher.update(bytemuck::cast_slice(times_s)).update(bytemuck::cast_slice(values));
             hasher.update(&[*interpolation as u8]);
         }

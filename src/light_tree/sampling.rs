@@ -42,6 +42,8 @@ pub struct FrameTree<'a> {
     /// Forced lights, in the order of their emitters.
     pub(super) forced: Vec<Placed>,
     emitter_count: u32,
+    /// The first emitter of a forced light, if there is one.
+    unforced_count: u32,
 }
 
 impl<D: AsRef<[u8]>> LightTree<D> {
@@ -73,6 +75,7 @@ impl<D: AsRef<[u8]>> LightTree<D> {
             own,
             forced: forced.collect(),
             emitter_count: self.emitter_count() as u32,
+            unforced_count: self.first_of_class(LightRow::FORCED),
         })
     }
 }
@@ -109,7 +112,7 @@ impl FrameTree<'_> {
 
     /// How many emitters belong to lights that are not forced: those that are come last.
     pub fn unforced_count(&self) -> u32 {
-        self.forced.first().map_or(self.emitter_count, |first| first.first_emitter)
+        self.unforced_count
     }
 
     /// How many lights are forced: sampled at every point, beside what is picked.
@@ -189,7 +192,8 @@ impl FrameTree<'_> {
     }
 
     /// Calls `visit` with every emitter that is not forced, its importance to the viewer and its
-    /// energy: what a perfect traversal would weigh.
+    /// energy: what a perfect traversal would weigh. In a tree that nobody verified, some may be
+    /// missing and some come twice.
     pub fn for_each_leaf(&self, viewer: &impl Viewer, mut visit: impl FnMut(u32, f64, f64)) {
         let Some(place) = self.place_of_root(viewer) else { return };
         let mut open = vec![(place, 1.0, 1.0)];
@@ -203,7 +207,9 @@ impl FrameTree<'_> {
                     let energy = f64::from(node.energy());
                     match node.link() {
                         Link::Emitter(_) => {
-                            if let Some(Next::Emitter(emitter)) = self.follow(&place, node.link()) {
+                            if let Some(Next::Emitter(emitter)) = self.follow(&place, node.link())
+                                && emitter < self.unforced_count
+                            {
                                 visit(emitter, weight * factor, energy * energy_factor);
                             }
                         }

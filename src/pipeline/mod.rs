@@ -1,9 +1,10 @@
 //! Floor 5: jobs, the only place where ingest meets the tree.
 //!
-//! [`load_scene`] reads a scene; [`survey()`] finds out what its tree depends on; [`build_tree`] builds
-//! the trees of a shot; [`check_fresh`] tells whether a tree still belongs to a scene, and if not,
-//! which lights changed.
+//! [`load_scene`] reads a scene; [`collect_emitters`] finds what shines in it; [`survey()`] finds out
+//! what its tree depends on; [`build_tree`] builds the trees of a shot; [`check_fresh`] tells whether
+//! a tree still belongs to a scene, and if not, which lights changed.
 
+mod agreement;
 mod build;
 mod camera;
 mod content;
@@ -12,7 +13,9 @@ mod frames;
 mod fresh;
 mod look;
 mod survey;
+mod textures;
 
+pub use agreement::{Contradiction, Standing, standing};
 pub use build::{Rebuilt, build_tree, rebuild_tree};
 pub use camera::{NoCamera, find_camera};
 pub use content::scene_fingerprint;
@@ -21,8 +24,8 @@ pub use frames::frames_of;
 pub use fresh::{
     OpenedTree, StaleTree, TreeError, check_fresh, is_tree_file, open_base, open_tree,
 };
-pub use look::is_built_from;
 pub use survey::{Group, PlacedLight, SharedBounds, Survey, survey};
+pub use textures::collect_emitters;
 
 use crate::ingest::{self, IngestError};
 use crate::scene::Scene;

@@ -70,11 +70,11 @@ pub enum Interpolation {
 /// What varies, at one time: world transforms of all nodes, strengths of the lights that have keys.
 #[derive(Clone, Debug)]
 pub struct Pose {
-    world: Vec<Affine3A>,
-    /// By row of [`Scene::lights`]; empty if none varies.
-    light_rgb: Vec<Option<Rgb>>,
-    /// By row of [`Scene::instances`]; empty if none varies.
-    instance_rgb: Vec<Option<Rgb>>,
+    pub(super) world: Vec<Affine3A>,
+    /// By row of [`Scene::lights`]; empty if none has keys.
+    pub(super) light_rgb: Vec<Option<Rgb>>,
+    /// By row of [`Scene::instances`]; empty if none has keys.
+    pub(super) instance_rgb: Vec<Option<Rgb>>,
 }
 
 impl Default for Trs {
@@ -84,23 +84,21 @@ impl Default for Trs {
 }
 
 impl Pose {
-    /// Composes the hierarchy in double precision, so that only the result is rounded.
-    pub(super) fn evaluate(scene: &Scene, time_s: f64) -> Pose {
+    /// Composes the hierarchy in double precision, so that only the result is rounded. Returns the
+    /// unrounded transforms too.
+    pub(super) fn evaluate(scene: &Scene, time_s: f64) -> (Pose, Vec<DAffine3>) {
         let mut exact: Vec<DAffine3> = Vec::with_capacity(scene.nodes.len());
         for node in &scene.nodes {
-            let local = node.local_at(time_s);
-            exact.push(match node.parent {
-                Some(parent) => exact[parent as usize] * local,
-                None => local,
-            });
+            exact.push(node.in_parent(&exact, time_s));
         }
         let lights = scene.lights.iter().map(|light| light.values.as_ref());
         let instances = scene.instances.iter().map(|instance| instance.values.as_ref());
-        Pose {
+        let pose = Pose {
             world: exact.iter().map(DAffine3::as_affine3a).collect(),
             light_rgb: values_at(lights, time_s),
             instance_rgb: values_at(instances, time_s),
-        }
+        };
+        (pose, exact)
     }
 
     /// The world-space radius of a sphere of some local radius at a node, metres: it grows with the
@@ -150,12 +148,15 @@ pub(super) fn moving(nodes: &[Node]) -> Vec<bool> {
     moves
 }
 
-/// Which nodes never change what is below them but by a similarity of one scale.
+/// Which nodes never change what is below them but by a similarity, at any time.
 pub(super) fn rigid(nodes: &[Node]) -> Vec<bool> {
     let mut rigid: Vec<bool> = Vec::with_capacity(nodes.len());
     for node in nodes {
         let above = node.parent.is_none_or(|parent| rigid[parent as usize]);
-        let keeps_size = !node.channels.iter().any(|c| matches!(c, Channel::Scale(_)));
+        let keeps_size = node.channels.iter().all(|channel| match channel {
+            Channel::Scale(keys) => keys.never_vanishes(),
+            _ => true,
+        });
         rigid.push(above && keeps_size && node.scales_evenly(RIGID_TOLERANCE));
     }
     rigid
@@ -163,6 +164,8 @@ pub(super) fn rigid(nodes: &[Node]) -> Vec<bool> {
 
 /// How far a scale may be from uniform for a shape to be kept, to the last bits.
 const RIGID_TOLERANCE: f64 = 1e-6;
+/// A scale that falls below this part of its largest is flat for a while.
+const LEAST_OF_LARGEST: f32 = 1e-4;
 
 impl Node {
     /// Whether the node's own transform keeps shapes at every time, up to a relative tolerance.
@@ -191,6 +194,12 @@ impl Node {
     /// A node that stands still.
     pub fn fixed(path: impl Into<String>, parent: Option<u32>, local: Trs) -> Node {
         Node { path: path.into(), parent, local, channels: Vec::new() }
+    }
+
+    /// Local to world at a time, given that of all nodes before.
+    pub(super) fn in_parent(&self, before: &[DAffine3], time_s: f64) -> DAffine3 {
+        let local = self.local_at(time_s);
+        self.parent.map_or(local, |parent| before[parent as usize] * local)
     }
 
     /// Local to parent at a time.
@@ -256,7 +265,18 @@ impl Keys<Vec3> {
         self.values.iter().fold(Vec3::ZERO, |peak, &value| peak.max(value))
     }
 
-    fn vector_at(&self, time_s: f64) -> DVec3 {
+    /// Whether a scale, the same along all axes, stays well away from zero between keys too.
+    fn never_vanishes(&self) -> bool {
+        let largest = self.values.iter().fold(0f32, |largest, value| largest.max(value.x.abs()));
+        let least = LEAST_OF_LARGEST * largest;
+        let (above, below) = (Vec3::splat(least), Vec3::splat(-least));
+        // A spline may pass through zero between keys that do not.
+        self.interpolation != Interpolation::Cubic
+            && (self.values.iter().all(|value| value.cmpgt(above).all())
+                || self.values.iter().all(|value| value.cmplt(below).all()))
+    }
+
+    pub(super) fn vector_at(&self, time_s: f64) -> DVec3 {
         let at = self.find(time_s);
         match self.interpolation {
             Interpolation::Linear => {
