@@ -3,7 +3,7 @@
 use super::agreement::{Contradiction, find_contradiction};
 use super::build::algorithm_of;
 use super::frames::spell;
-use super::{frames_of, survey};
+use super::{Survey, frames_of, survey};
 use crate::emitter::{Emitters, LightOverflow};
 use crate::light_tree::{ALGORITHM_VERSION, LightSummary, LightTree};
 use crate::scene::Scene;
@@ -160,14 +160,37 @@ pub fn check_fresh<D: AsRef<[u8]> + Sync>(
 ) -> Result<(), TreeError> {
     let frames: Vec<i32> = tree.frames().iter().map(|row| row.frame).collect();
     let survey = survey(scene, emitters, &frames)?;
-    let remedy = || build_command(scene, path, &frames, forced);
     if survey.fingerprint != tree.fingerprint() {
-        let cause = compare(tree, &survey.lights, remedy());
+        let remedy = build_command(scene, path, &frames, forced);
+        let cause = compare(tree, &survey.lights, remedy);
         return Err(TreeError::Stale { path: path.into(), cause });
     }
-    match find_contradiction(tree, &survey, leaves) {
+    check_agreement(tree, path, scene, &survey, forced, leaves)
+}
+
+/// Refuses a tree that has the fingerprint of a survey and says something else than the survey. What
+/// is of another content is let pass.
+///
+/// # Errors
+/// [`TreeError::Contradicts`].
+pub fn check_agreement<D: AsRef<[u8]> + Sync>(
+    tree: &LightTree<D>,
+    path: &Path,
+    scene: &Scene,
+    survey: &Survey,
+    forced: &[String],
+    leaves: bool,
+) -> Result<(), TreeError> {
+    if survey.fingerprint != tree.fingerprint() {
+        return Ok(());
+    }
+    match find_contradiction(tree, survey, leaves) {
         None => Ok(()),
-        Some(cause) => Err(TreeError::Contradicts { path: path.into(), cause, remedy: remedy() }),
+        Some(cause) => {
+            let frames: Vec<i32> = tree.frames().iter().map(|row| row.frame).collect();
+            let remedy = build_command(scene, path, &frames, forced);
+            Err(TreeError::Contradicts { path: path.into(), cause, remedy })
+        }
     }
 }
 

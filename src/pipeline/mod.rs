@@ -22,7 +22,8 @@ pub use content::scene_fingerprint;
 pub use forced::{NoLightThere, force_lights};
 pub use frames::frames_of;
 pub use fresh::{
-    OpenedTree, StaleTree, TreeError, check_fresh, is_tree_file, open_base, open_tree,
+    OpenedTree, StaleTree, TreeError, check_agreement, check_fresh, is_tree_file, open_base,
+    open_tree,
 };
 pub use survey::{Group, PlacedLight, SharedBounds, Survey, survey};
 pub use textures::collect_emitters;
