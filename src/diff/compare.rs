@@ -16,6 +16,7 @@ use crate::light_tree::LightTree;
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 use std::collections::HashMap;
+use std::path::PathBuf;
 
 /// What a comparison is to find out besides what changed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -29,10 +30,15 @@ pub struct DiffOptions {
 /// Compares two versions.
 ///
 /// # Errors
-/// A scene with a light that no tree can hold.
+/// A scene with a light that no tree can hold; a tree that contradicts the other version, of which it
+/// says that it is the same.
 pub fn compare(before: &Side, after: &Side, options: &DiffOptions) -> Result<Diff, SideError> {
     let surveyed = Surveyed::both(before, after)?;
     let sides = [&surveyed[0], &surveyed[1]];
+    if sides[0].contradicts(sides[1]) {
+        let [before, after] = [before, after].map(|side| PathBuf::from(&side.name().file));
+        return Err(SideError::Contradiction { before, after });
+    }
     let names = [before, after].map(|side| side.name().clone());
     let looks_closer = *options != DiffOptions::default();
     if sides[0].has_rows_of(sides[1]) && !looks_closer {

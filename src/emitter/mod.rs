@@ -21,7 +21,9 @@ mod posed;
 mod set;
 mod shaping;
 mod sphere;
+mod texel_rows;
 mod texels;
+mod textured;
 mod triangle;
 
 pub use bounding::LightOverflow;
@@ -30,3 +32,4 @@ pub use mesh_light::MeshLight;
 pub use posed::{EmitterHit, LightSample, MeshPlace, PosedEmitters};
 pub use set::{EmitterPlace, EmitterRef, Emitters, LightEntry, LightSource};
 pub use sphere::WorldSphere;
+pub use textured::{KnownMeans, LitTriangle, TextureMeans};

@@ -54,7 +54,9 @@ pub use glossy::{Glossy, Lobes};
 pub use group::{Group, WIDTH};
 pub use leaves::LeafTable;
 pub use node::{Link, Node};
-pub use records::{FrameRow, InstanceRow, LightLook, LightRow, TreeKind, TreeRow};
+pub use records::{
+    FrameRow, InstanceRow, LightLook, LightRow, MeanRow, TextureRow, TreeKind, TreeRow,
+};
 pub use sampling::{FrameTree, Pick};
 pub use segment::Segment;
 pub use splitting::{SplitTest, Splitting};

@@ -42,6 +42,8 @@ pub struct FrameTree<'a> {
     /// Forced lights, in the order of their emitters.
     pub(super) forced: Vec<Placed>,
     pub(super) emitter_count: u32,
+    /// The first emitter of a forced light, if there is one.
+    unforced_count: u32,
 }
 
 impl<D: AsRef<[u8]>> LightTree<D> {
@@ -73,6 +75,7 @@ impl<D: AsRef<[u8]>> LightTree<D> {
             own,
             forced: forced.collect(),
             emitter_count: self.emitter_count() as u32,
+            unforced_count: self.first_of_class(LightRow::FORCED),
         })
     }
 }
@@ -91,7 +94,7 @@ impl FrameTree<'_> {
 
     /// The number of emitters that are not forced. Forced ones are numbered after them.
     pub fn unforced_count(&self) -> u32 {
-        self.forced.first().map_or(self.emitter_count, |first| first.first_emitter)
+        self.unforced_count
     }
 
     /// The number of forced lights: each is sampled at every point, besides what is picked.
@@ -127,7 +130,8 @@ impl FrameTree<'_> {
     }
 
     /// Calls `visit` with every emitter that is not forced, its importance to the viewer and its
-    /// energy in world space: what a perfect traversal would weigh.
+    /// energy in world space: what a perfect traversal would weigh. In a tree that nobody verified,
+    /// some may be missing and some come twice.
     pub fn for_each_leaf(&self, viewer: &impl Viewer, mut visit: impl FnMut(u32, f64, f64)) {
         let Some(place) = self.place_of_root(viewer) else { return };
         let mut open = vec![(place, 1.0)];
@@ -140,7 +144,10 @@ impl FrameTree<'_> {
                     }
                     let energy = f64::from(group.energy(lane)) * energy_factor;
                     match self.follow(&place, group, lane) {
-                        Some(Next::Emitter(emitter)) => visit(emitter, importance, energy),
+                        Some(Next::Emitter(emitter)) if emitter < self.unforced_count => {
+                            visit(emitter, importance, energy);
+                        }
+                        Some(Next::Emitter(_)) => {}
                         Some(Next::Group(below)) => {
                             let own = f64::from(self.trees[below.row as usize].root.energy());
                             open.push((below, energy / own));

@@ -26,7 +26,9 @@ mod material;
 mod medium;
 mod mesh;
 mod pose;
+mod posing;
 mod requirements;
+mod steady;
 mod texture;
 mod timeline;
 mod values;
@@ -38,6 +40,7 @@ pub use material::{AlphaMode, Material};
 pub use medium::{FogBox, Medium};
 pub use mesh::{Instance, Mesh};
 pub use pose::{Channel, Interpolation, Keys, Node, Pose, Trs};
+pub use posing::Posing;
 pub use requirements::Requirements;
 pub use texture::{Pixels, Texture, TextureUse, Wrap};
 pub use timeline::Timeline;
@@ -81,7 +84,7 @@ pub struct Scene {
 impl Scene {
     /// Where everything is and how strong it shines at `time_s` seconds on the file's clock.
     pub fn pose_at(&self, time_s: f64) -> Pose {
-        Pose::evaluate(self, time_s)
+        Pose::evaluate(self, time_s).0
     }
 
     /// For each node, whether it moves with time.
@@ -89,8 +92,8 @@ impl Scene {
         pose::moving(&self.nodes)
     }
 
-    /// For each node, whether it keeps shapes and sizes however it moves: neither it nor an ancestor
-    /// scales unevenly, or with time.
+    /// For each node, whether it keeps shapes however it moves: neither it nor an ancestor scales
+    /// unevenly at any time, or down to nothing.
     pub fn rigid_nodes(&self) -> Vec<bool> {
         pose::rigid(&self.nodes)
     }

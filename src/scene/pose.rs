@@ -72,11 +72,11 @@ pub enum Interpolation {
 /// Whatever varies, at one time: world transforms of all nodes, strengths of the lights with keys.
 #[derive(Clone, Debug)]
 pub struct Pose {
-    world: Vec<Affine3A>,
-    /// By row of [`Scene::lights`]; empty if none varies.
-    light_rgb: Vec<Option<Rgb>>,
-    /// By row of [`Scene::instances`]; empty if none varies.
-    instance_rgb: Vec<Option<Rgb>>,
+    pub(super) world: Vec<Affine3A>,
+    /// By row of [`Scene::lights`]; empty if none has keys.
+    pub(super) light_rgb: Vec<Option<Rgb>>,
+    /// By row of [`Scene::instances`]; empty if none has keys.
+    pub(super) instance_rgb: Vec<Option<Rgb>>,
 }
 
 impl Default for Trs {
@@ -86,24 +86,22 @@ impl Default for Trs {
 }
 
 impl Pose {
-    /// Composes the hierarchy in double precision, so that only the result is rounded.
-    pub(super) fn evaluate(scene: &Scene, time_s: f64) -> Pose {
+    /// Composes the hierarchy in double precision, so that only the result is rounded. Returns the
+    /// unrounded transforms too.
+    pub(super) fn evaluate(scene: &Scene, time_s: f64) -> (Pose, Vec<DAffine3>) {
         let at = Instant { time_s, timeline: scene.timeline };
         let mut exact: Vec<DAffine3> = Vec::with_capacity(scene.nodes.len());
         for node in &scene.nodes {
-            let local = node.local_at(at);
-            exact.push(match node.parent {
-                Some(parent) => exact[parent as usize] * local,
-                None => DAffine3 { translation: local.translation - scene.origin, ..local },
-            });
+            exact.push(node.in_world(scene.origin, &exact, at));
         }
         let lights = scene.lights.iter().map(|light| light.values.as_ref());
         let instances = scene.instances.iter().map(|instance| instance.values.as_ref());
-        Pose {
+        let pose = Pose {
             world: exact.iter().map(DAffine3::as_affine3a).collect(),
             light_rgb: values_at(lights, at),
             instance_rgb: values_at(instances, at),
-        }
+        };
+        (pose, exact)
     }
 
     /// The world-space radius of a sphere of some local radius at a node, metres. It grows with the
@@ -153,12 +151,15 @@ pub(super) fn moving(nodes: &[Node]) -> Vec<bool> {
     moves
 }
 
-/// Which nodes never change what is below them but by a similarity of one scale.
+/// Which nodes never change what is below them but by a similarity, at any time.
 pub(super) fn rigid(nodes: &[Node]) -> Vec<bool> {
     let mut rigid: Vec<bool> = Vec::with_capacity(nodes.len());
     for node in nodes {
         let above = node.parent.is_none_or(|parent| rigid[parent as usize]);
-        let keeps_size = !node.channels.iter().any(|c| matches!(c, Channel::Scale(_)));
+        let keeps_size = node.channels.iter().all(|channel| match channel {
+            Channel::Scale(keys) => keys.never_vanishes(),
+            _ => true,
+        });
         rigid.push(above && keeps_size && node.scales_evenly(RIGID_TOLERANCE));
     }
     rigid
@@ -166,6 +167,8 @@ pub(super) fn rigid(nodes: &[Node]) -> Vec<bool> {
 
 /// How far a scale may be from uniform for a shape to be kept, to the last bits.
 const RIGID_TOLERANCE: f64 = 1e-6;
+/// A scale that falls below this part of its largest is flat for a while.
+const LEAST_OF_LARGEST: f32 = 1e-4;
 
 impl Node {
     /// Whether the node's own transform keeps shapes at every time, up to a relative tolerance.
@@ -196,6 +199,15 @@ impl Node {
         Node { path: path.into(), parent, local, channels: Vec::new() }
     }
 
+    /// Local to world at a time, seen from an origin, given that of all nodes before.
+    pub(super) fn in_world(&self, origin: DVec3, before: &[DAffine3], at: Instant) -> DAffine3 {
+        let local = self.local_at(at);
+        match self.parent {
+            Some(parent) => before[parent as usize] * local,
+            None => DAffine3 { translation: local.translation - origin, ..local },
+        }
+    }
+
     /// Local to parent at a time.
     fn local_at(&self, at: Instant) -> DAffine3 {
         let (mut translation, mut rotation, mut scale) = match self.local {
@@ -215,9 +227,9 @@ impl Node {
 
 /// A time at which everything is evaluated.
 #[derive(Clone, Copy)]
-struct Instant {
-    time_s: f64,
-    timeline: Timeline,
+pub(super) struct Instant {
+    pub(super) time_s: f64,
+    pub(super) timeline: Timeline,
 }
 
 /// Where a time falls among keys: the two neighbours, the fraction between them, their distance.
@@ -272,7 +284,18 @@ impl Keys<Vec3> {
         self.values.iter().fold(Vec3::ZERO, |peak, &value| peak.max(value))
     }
 
-    fn vector_at(&self, at: Instant) -> DVec3 {
+    /// Whether a scale, the same along all axes, stays well away from zero between keys too.
+    fn never_vanishes(&self) -> bool {
+        let largest = self.values.iter().fold(0f32, |largest, value| largest.max(value.x.abs()));
+        let least = LEAST_OF_LARGEST * largest;
+        let (above, below) = (Vec3::splat(least), Vec3::splat(-least));
+        // A spline may pass through zero between keys that do not.
+        self.interpolation != Interpolation::Cubic
+            && (self.values.iter().all(|value| value.cmpgt(above).all())
+                || self.values.iter().all(|value| value.cmplt(below).all()))
+    }
+
+    pub(super) fn vector_at(&self, at: Instant) -> DVec3 {
         let at = self.find(at);
         match self.interpolation {
             Interpolation::Linear => {

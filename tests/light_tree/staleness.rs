@@ -112,7 +112,7 @@ fn staleness(scene: &Scene) -> Option<StaleTree> {
     let survey = pipeline::survey(&street, &Emitters::collect(&street), &[1, 2, 3]).unwrap();
     let tree = LightTree::open(pipeline::build_tree(&survey)).unwrap();
     let emitters = Emitters::collect(scene);
-    match pipeline::check_fresh(&tree, Path::new("street.ltree"), scene, &emitters, &[]) {
+    match pipeline::check_fresh(&tree, Path::new("street.ltree"), scene, &emitters, &[], true) {
         Ok(()) => None,
         Err(TreeError::Stale { cause, .. }) => Some(cause),
         Err(other) => panic!("{other}"),

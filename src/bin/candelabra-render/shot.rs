@@ -2,10 +2,11 @@
 
 use crate::arguments::Arguments;
 use crate::progress::Bar;
+use crate::texture_bar::TextureBar;
 use anyhow::{Context, Result, bail};
 use candelabra::emitter::Emitters;
 use candelabra::light_tree::{ALGORITHM_VERSION, LightTree};
-use candelabra::pipeline;
+use candelabra::pipeline::{self, OpenedTree};
 use candelabra::render::exr::{ExrOptions, read_metadata, write_exr};
 use candelabra::render::frames::Frames;
 use candelabra::render::png::{exposure_for, write_png};
@@ -50,14 +51,17 @@ pub fn render(arguments: &Arguments) -> Result<usize> {
     }
     let camera = look.camera;
     refuse_to_overwrite(arguments, &scene, &frames)?;
-    let emitters = Emitters::collect(&scene);
     match &arguments.tree {
         Some(path) => {
-            let tree = pipeline::open_tree(path, !arguments.no_verify)?;
-            pipeline::check_fresh(&tree, path, &scene, &emitters, &arguments.force_light)?;
+            let verify = !arguments.no_verify;
+            let tree = pipeline::open_tree(path, verify)?;
+            let emitters = collect(&scene, Some(&tree));
+            let forced = &arguments.force_light;
+            pipeline::check_fresh(&tree, path, &scene, &emitters, forced, verify)?;
             render_frames(arguments, &scene, &emitters, &tree, camera, &frames)
         }
         None => {
+            let emitters = collect(&scene, None);
             let mut ascending = frames.as_slice().to_vec();
             ascending.sort_unstable();
             let survey = pipeline::survey(&scene, &emitters, &ascending)?;
@@ -66,6 +70,12 @@ pub fn render(arguments: &Arguments) -> Result<usize> {
             render_frames(arguments, &scene, &emitters, &tree, camera, &frames)
         }
     }
+}
+
+/// The emitters of a scene, with a bar where that lasts.
+fn collect(scene: &Scene, tree: Option<&OpenedTree>) -> Emitters {
+    let bar = TextureBar::new();
+    pipeline::collect_emitters(scene, tree, &|done, all| bar.show(done, all))
 }
 
 /// No picture may replace what it is rendered from.

@@ -116,6 +116,7 @@ impl Walk<'_> {
 
     fn push(&mut self, output: &mut Output, mut node: Node) -> Result<u32, Fault> {
         node.path = self.paths.claim(node.path);
+        node.settle();
         let bytes = size_of::<Node>() + 2 * node.path.len();
         output.budget.take(bytes as u64, || "nodes".to_string())?;
         let above = node.parent.is_none_or(|parent| self.uniform[parent as usize]);

@@ -111,7 +111,8 @@ fn strength(row: &Row, object: &str) -> Result<Rgb, Fault> {
     }
 }
 
-/// The strength over time that `extras.usdLux` gives, in the light's own unit.
+/// The strength over time that `extras.usdLux` gives, in the light's own unit. One key if it is
+/// constant.
 pub(super) fn values(lux: Option<&UsdLux>, object: &str) -> Result<Option<Keys<Rgb>>, Fault> {
     let Some(UsdValues { times, rgb }) = lux.and_then(|lux| lux.values.as_ref()) else {
         return Ok(None);
@@ -132,7 +133,7 @@ pub(super) fn values(lux: Option<&UsdLux>, object: &str) -> Result<Option<Keys<R
     if values.iter().any(|value| value.min_element() < 0.0) {
         return fault("an rgb value is negative".into());
     }
-    Ok(Some(Keys { times_s, values, interpolation: Interpolation::Linear }))
+    Ok(Some(Keys { times_s, values, interpolation: Interpolation::Linear }.settled()))
 }
 
 /// The emission profile that `extras.usdLux` gives.
