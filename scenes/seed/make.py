@@ -17,6 +17,7 @@ import lamps
 import million_points
 import spiral_mesh
 import spiral_points
+import textured_lights
 
 SCENES = {
     "spiral_points": spiral_points.write,
@@ -27,8 +28,9 @@ SCENES = {
     "lamps_100": partial(lamps.write, lights=100),
     "lamps_1000": partial(lamps.write, lights=1000),
     "fog_spots": fog_spots.write,
+    "textured_lights": textured_lights.write,
 }
-GLTF = {"million_points", "one_area"}
+GLTF = {"million_points", "one_area", "textured_lights"}
 EXPORTER = Path(__file__).resolve().parents[2] / "scripts" / "usd_to_gltf.py"
 
 

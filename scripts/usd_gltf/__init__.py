@@ -3,22 +3,27 @@
 A tour, in the order of the work:
 
 `cli`               arguments and exit codes
-`source_hash`       is the output already up to date?
+`source_hash`       what was read, and is the output already up to date?
 `stage`             opens the stage: payloads, variants, frames
+`composition`       what USD's composition complained of
 `export`            the whole job, from an opened stage to files
 `prim_tree`         compiles USD prims into a plain tree (`Prim`), once for each prototype
 `node_writer`       stamps that tree into glTF nodes, once for each instance
+`light_attributes`  where a light's input is authored: new names, old ones, Arnold's
 `light_inputs`      UsdLux's formulas: nits, lux, candela
+`light_visibility`, `light_losses`, `vendors`   which rays see a light; what is lost of it
 `light_shapes`      tessellation and world-space areas of the intrinsic lights
 `light_carriers`    which glTF object carries which light
+`light_textures`    the pictures of rect lights and domes
+`pictures`, `baking`, `asset_files`     picture files into arrays, light of any range into a PNG
 `mesh`, `triangulate`, `primvars`, `gprims`     geometry
 `materials`, `preview_surface`, `textures`      looks
-`instancers`, `cameras`, `transforms`, `animation`
+`instancers`, `cameras`, `fog`, `transforms`, `animation`
 `gltf_document`     buffers, accessors, JSON, files
-`report`            what had no carrier
+`report`            what had no carrier, by category
 
 Matrices here multiply column vectors (the transpose of Gf's). Stage units and axes are kept in all
 nodes; one root node turns them into metres and +Y up.
 """
 
-EXPORTER = "candelabra usd_to_gltf 1.0"
+EXPORTER = "candelabra usd_to_gltf 1.1"

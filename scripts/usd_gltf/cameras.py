@@ -1,7 +1,7 @@
 """UsdGeomCamera to a glTF camera and `extras.usdCamera`.
 
 Apertures and focal lengths are tenths of a stage unit, distances stage units (usdGeom/schema.usda);
-glTF gets metres.
+glTF gets metres. An orthographic camera's window is its aperture, in the same tenths.
 """
 
 from __future__ import annotations
@@ -10,19 +10,24 @@ import math
 
 from pxr import Usd, UsdGeom
 
-from .gltf_document import number
-from .report import Report
+from .gltf_document import number, numbers
+from .report import Notebook
 from .stage import Frames, changes
+from .vendors import report_others
 
 _TENTH = 0.1
 _READ = (
     "projection", "horizontalAperture", "verticalAperture", "horizontalApertureOffset",
-    "verticalApertureOffset", "focalLength", "fStop", "focusDistance", "clippingRange",
+    "verticalApertureOffset", "focalLength", "fStop", "focusDistance", "clippingRange", "exposure",
+    "exposure:iso", "exposure:time", "exposure:fStop", "exposure:responsivity",
 )  # fmt: skip
+_DEFAULT_RANGE = (1.0, 1e6)
+"""UsdGeomCamera's fallback, which is not what anybody chose to see."""
+_LARGEST = 3e38
 
 
 def read_camera(
-    prim: Usd.Prim, frames: Frames, meters_per_unit: float, report: Report
+    prim: Usd.Prim, frames: Frames, meters_per_unit: float, report: Notebook
 ) -> tuple[dict, dict] | None:
     """The glTF camera and its extras; None (reported) if there is no carrier for it."""
     camera = UsdGeom.Camera(prim)
@@ -36,34 +41,76 @@ def read_camera(
         value = attribute.Get(frames.first)
         return float(value) if value is not None else math.nan
 
-    if camera.GetProjectionAttr().Get(frames.first) == UsdGeom.Tokens.orthographic:
-        report.warn(path, "orthographic camera", "the renderer knows perspective only; it is left out")
-        return None
+    orthographic = camera.GetProjectionAttr().Get(frames.first) == UsdGeom.Tokens.orthographic
     width, height = get(camera.GetHorizontalApertureAttr()), get(camera.GetVerticalApertureAttr())
     focal = get(camera.GetFocalLengthAttr())
-    if not all(math.isfinite(v) and v > 0 for v in (width, height, focal)):
+    if not all(math.isfinite(v) and v > 0 for v in (width, height, 1.0 if orthographic else focal)):
         why = f"apertures {width:g} x {height:g} and focal length {focal:g} must be positive; it is left out"
         report.warn(path, "camera without a field of view", why)
         return None
-    near, far = camera.GetClippingRangeAttr().Get(frames.first) or (1.0, 1e6)
-    perspective = {
-        "yfov": number(2 * math.atan(height / (2 * focal))),
-        "aspectRatio": number(width / height),
-        "znear": number(max(near * meters_per_unit, 1e-6)) if math.isfinite(near) else 1e-3,
-    }
-    if math.isfinite(far) and number(far * meters_per_unit) > perspective["znear"]:
-        perspective["zfar"] = number(far * meters_per_unit)
+    near, far = _clipping(camera, frames, report)
     extras = {
         "fStop": max(_finite(get(camera.GetFStopAttr())), 0.0),
-        "focalLength_m": number(focal * _TENTH * meters_per_unit),
+        "focalLength_m": _finite(focal * _TENTH * meters_per_unit),
         "focusDistance_m": max(_finite(get(camera.GetFocusDistanceAttr()) * meters_per_unit), 0.0),
         "filmOffset": [
             _finite(get(camera.GetHorizontalApertureOffsetAttr()) / width),
             _finite(get(camera.GetVerticalApertureOffsetAttr()) / height),
         ],
     }
+    if (near, far) != _DEFAULT_RANGE:
+        extras["clippingRange_m"] = numbers((near * meters_per_unit, min(far * meters_per_unit, _LARGEST)))
+    exposure = camera.ComputeLinearExposureScale(frames.first)
+    if not (math.isfinite(exposure) and 0 < exposure < _LARGEST):
+        report.warn(path, "camera exposure is no factor", f"its attributes give {exposure:g}; 1 is used")
+    elif number(exposure) != 1.0:
+        extras["exposureScale"] = number(exposure)
+    _report_losses(camera, frames, report)
     report.count("cameras")
+    znear, zfar = number(max(near * meters_per_unit, 0.0)), number(min(far * meters_per_unit, _LARGEST))
+    if orthographic:
+        half = _TENTH * meters_per_unit / 2
+        extent = {"xmag": number(width * half), "ymag": number(height * half)}
+        return {"type": "orthographic", "orthographic": {**extent, "znear": znear, "zfar": zfar}}, extras
+    perspective = {
+        "yfov": number(2 * math.atan(height / (2 * focal))),
+        "aspectRatio": number(width / height),
+        "znear": max(znear, 1e-6),
+        "zfar": zfar,
+    }
+    if perspective["zfar"] <= perspective["znear"]:
+        del perspective["zfar"]
     return {"type": "perspective", "perspective": perspective}, extras
+
+
+def _clipping(camera: UsdGeom.Camera, frames: Frames, report: Notebook) -> tuple[float, float]:
+    """The clipping range in stage units; the fallback (reported) for one that is none."""
+    found = camera.GetClippingRangeAttr().Get(frames.first)
+    near, far = (float(found[0]), float(found[1])) if found is not None else _DEFAULT_RANGE
+    if not (math.isfinite(near) and near < far):
+        why = f"it is {near:g} to {far:g}; nothing is clipped"
+        report.warn(camera.GetPath(), "clippingRange is no range", why)
+        return _DEFAULT_RANGE
+    return near, far
+
+
+def _report_losses(camera: UsdGeom.Camera, frames: Frames, report: Notebook) -> None:
+    """What a camera has and the file cannot hold."""
+    prim, path = camera.GetPrim(), camera.GetPath()
+    planes = camera.GetClippingPlanesAttr().Get(frames.first)
+    if planes:
+        report.warn(path, "clippingPlanes", f"{len(planes)} planes have no carrier; nothing is cut by them")
+    opens = camera.GetShutterOpenAttr().Get(frames.first) or 0.0
+    closes = camera.GetShutterCloseAttr().Get(frames.first) or 0.0
+    if opens != closes:
+        why = f"it is open from {opens:g} to {closes:g}; motion blur has no carrier"
+        stage = prim.GetStage()
+        moves = len(frames.codes) > 1 or stage.GetEndTimeCode() > stage.GetStartTimeCode()
+        line = report.warn if moves else report.note
+        line(path, "camera shutter", why if moves else f"{why}, and the stage has one frame")
+    if camera.GetStereoRoleAttr().Get(frames.first) not in (None, UsdGeom.Tokens.mono):
+        report.note(path, "camera stereoRole", "each camera is carried by itself")
+    report_others(prim, set(), frames.first, report)
 
 
 def _finite(value: float) -> float:

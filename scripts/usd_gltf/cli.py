@@ -1,6 +1,6 @@
 """The command line: `usd_to_gltf.py in.usd out.glb [options]`.
 
-Exit codes: 0 done or up to date, 1 failed (also warnings under --strict), 2 usage.
+Exit codes: 0 done or up to date, 1 failed (also warnings that --strict makes errors), 2 usage.
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ from pxr import Tf, UsdUtils
 
 from .export import export
 from .gltf_document import write_atomically
-from .report import ExportError
-from .source_hash import recorded_hash, source_hash
+from .report import CATEGORIES, ExportError
+from .source_hash import recorded_hash, up_to_date
 from .stage import Options, first_line
 
 _PURPOSES = ("default", "render", "proxy", "guide")
@@ -25,7 +25,7 @@ _PURPOSES = ("default", "render", "proxy", "guide")
 
 def main(arguments: list[str]) -> int:
     """Run the exporter; returns the exit code."""
-    options = _parser().parse_args(arguments)
+    options = _parser().parse_args(["--strict=" + ",".join(CATEGORIES) if a == "--strict" else a for a in arguments])
     sys.setrecursionlimit(20_000)  # a prim hierarchy may be deep
     try:
         return _run(options)
@@ -47,7 +47,9 @@ def main(arguments: list[str]) -> int:
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
-        prog="usd_to_gltf.py", description="Export a USD stage to glTF without losing its lights."
+        prog="usd_to_gltf.py",
+        description="Export a USD stage to glTF without losing its lights.",
+        allow_abbrev=False,
     )
     parser.add_argument("source", type=Path, help="a .usd, .usda, .usdc or .usdz file")
     parser.add_argument("output", type=_output, help="the .glb or .gltf file to write")
@@ -59,7 +61,11 @@ def _parser() -> argparse.ArgumentParser:
                         help="purposes to export, of default,render,proxy,guide (default: default,render)")  # fmt: skip
     parser.add_argument("--normalize-area", choices=("stage", "metre"), default="stage",
                         help="unit of the area that `normalize` divides by (default: stage)")  # fmt: skip
-    parser.add_argument("--strict", action="store_true", help="fail if anything has no carrier or is missing")
+    # `--strict` alone stands for all categories (`main` spells it out), so that it never takes the
+    # word after it for its list.
+    parser.add_argument("--strict", type=_categories, default=(), metavar="[=LIST]",
+                        help="fail if anything was lost or changed; --strict=LIST looks only at some categories, "
+                        f"of {','.join(CATEGORIES)}")  # fmt: skip
     parser.add_argument("--report", type=Path, metavar="FILE", help="where the report goes (default: OUT.report.json)")
     return parser
 
@@ -96,6 +102,14 @@ def _purposes(text: str) -> tuple[str, ...]:
     return tuple(sorted(set(chosen)))
 
 
+def _categories(text: str) -> tuple[str, ...]:
+    chosen = tuple(word.strip() for word in text.split(","))
+    for word in chosen:
+        if word not in CATEGORIES:
+            raise argparse.ArgumentTypeError(f"'{word}' is no category; choose of {', '.join(CATEGORIES)}")
+    return tuple(category for category in CATEGORIES if category in chosen)
+
+
 def _run(arguments: argparse.Namespace) -> int:
     source, output = arguments.source, arguments.output
     report_path = arguments.report or output.with_name(output.name + ".report.json")
@@ -109,24 +123,29 @@ def _run(arguments: argparse.Namespace) -> int:
         raise ExportError(f"{source}: no such file")
     # Takes USD's own messages off stderr; what matters of them comes through the report.
     diagnostics = UsdUtils.CoalescingDiagnosticDelegate()
-    fingerprint = source_hash(source, options)
-    if recorded_hash(output) == fingerprint and _reported(report_path, fingerprint, arguments.strict):
+    recorded = recorded_hash(output)
+    if recorded is not None and _is_current(report_path, recorded, source, options, arguments.strict):
         print(f"{output}: up to date")
         return 0
 
-    exported = export(source, output, options, fingerprint)
+    exported = export(source, output, options)
     diagnostics.TakeUncoalescedDiagnostics()
     report = exported.report
     for line in report.summary():
         print(line, file=sys.stderr)
-    if arguments.strict and report.warnings:
-        _write_report(report_path, report.to_json(str(source), str(output), fingerprint))
-        count = len(report.warnings)
-        why = f"{count} warning{'s' * (count != 1)} under --strict; nothing was written (see {report_path})"
+    text = report.to_json(str(source), str(output), exported.fingerprint, exported.dependencies)
+    refused = report.warnings_in(arguments.strict)
+    if refused:
+        _write_report(report_path, text)
+        count = len(refused)
+        strict = "--strict" if arguments.strict == CATEGORIES else f"--strict={','.join(arguments.strict)}"
+        why = f"{count} warning{'s' * (count != 1)} under {strict}; nothing was written (see {report_path})"
         raise ExportError(f"{source}: {why}")
     exported.document.write(exported.usd)
-    _write_report(report_path, report.to_json(str(source), str(output), fingerprint))
+    _write_report(report_path, text)
     counts = ", ".join(f"{number} {what}" for what, number in sorted(report.counts.items()))
+    if report.notes:
+        counts += f"; {len(report.notes)} notes in {report_path.name}"
     print(f"{output}: written ({counts})")
     return 0
 
@@ -135,10 +154,13 @@ def _write_report(path: Path, text: str) -> None:
     write_atomically(path, text.encode("utf-8", errors="replace"))
 
 
-def _reported(path: Path, fingerprint: str, strict: bool) -> bool:
-    """Whether the report of the same export exists, and has no warnings if they are errors."""
+def _is_current(path: Path, fingerprint: str, source: Path, options: Options, strict: tuple[str, ...]) -> bool:
+    """Whether the report at `path` is of the export with this fingerprint, whose files are still the
+    same, and has no warning that `strict` makes an error."""
     try:
         report = json.loads(path.read_bytes())
-        return report["sourceHash"] == fingerprint and not (strict and report["warnings"])
-    except (OSError, ValueError, KeyError, TypeError):
+        if report["sourceHash"] != fingerprint or any(w["category"] in strict for w in report["warnings"]):
+            return False
+        return up_to_date(source, options, fingerprint, report["dependencies"])
+    except (OSError, ValueError, KeyError, TypeError, AttributeError):
         return False

@@ -11,12 +11,14 @@ from pxr import Usd, UsdGeom
 from . import EXPORTER
 from .gltf_document import Document, number
 from .light_carriers import LightCarriers
+from .light_textures import LightTextures
 from .materials import Materials
 from .mesh import MeshReader
 from .node_writer import NodeWriter, root_node
 from .preview_surface import PreviewSurfaces
 from .prim_tree import PrimTree
 from .report import Report
+from .source_hash import Dependencies
 from .stage import Frames, Options, choose_frames, open_stage
 from .textures import Textures
 
@@ -28,32 +30,40 @@ class Exported:
     document: Document
     usd: dict
     report: Report
+    fingerprint: str
+    dependencies: dict[str, str]
 
 
-def export(source: Path, output: Path, options: Options, fingerprint: str) -> Exported:
+def export(source: Path, output: Path, options: Options) -> Exported:
     """Compile `source` into a document; nothing is written yet."""
     report = Report()
-    stage = open_stage(source, options, report)
-    frames = choose_frames(stage, options, report)
+    other = report.about("other")
+    dependencies = Dependencies(source)
+    stage = open_stage(source, options, other)
+    frames = choose_frames(stage, options, report.about("animation"))
     meters_per_unit = UsdGeom.GetStageMetersPerUnit(stage)
     if not (math.isfinite(meters_per_unit) and meters_per_unit > 0):
-        report.warn("/", "metersPerUnit is not positive", f"it is {meters_per_unit}; 0.01 is used")
+        other.warn("/", "metersPerUnit is not positive", f"it is {meters_per_unit}; 0.01 is used")
         meters_per_unit = 0.01
     up_axis = str(UsdGeom.GetStageUpAxis(stage))
 
     document = Document(output)
-    textures = Textures(document, frames.first, report)
-    materials = Materials(document, PreviewSurfaces(textures, frames, report).read, report)
-    meshes = MeshReader(document, materials, frames, report)
-    tree = PrimTree(stage, meshes, frames, options.purposes, meters_per_unit, report)
+    textures = Textures(document, dependencies, frames.first, report.about("materials"))
+    surfaces = PreviewSurfaces(textures, frames, report.about("materials"))
+    materials = Materials(document, surfaces.read, report.about("materials"))
+    meshes = MeshReader(document, materials, frames, report.about("geometry"))
+    tree = PrimTree(stage, meshes, frames, options.purposes, meters_per_unit, report.about("geometry"))
+    pictures = LightTextures(document, dependencies, frames, report.about("lights"))
     carriers = LightCarriers(
-        document, materials, textures, frames, meters_per_unit, options.normalize_area, report
+        document, materials, pictures, frames, meters_per_unit, options.normalize_area, report.about("lights")
     )
-    writer = NodeWriter(document, materials, carriers, frames, report)
+    writer = NodeWriter(document, materials, carriers, frames, report.about("animation"))
     writer.write(tree.roots(), root_node(meters_per_unit, up_axis == UsdGeom.Tokens.z))
-    report.count("nodes", len(document.nodes))
+    other.count("nodes", len(document.nodes))
+    dependencies.add_layers(stage)
+    fingerprint = dependencies.fingerprint(options)
     usd = _asset_extras(meters_per_unit, up_axis, frames, options, fingerprint)
-    return Exported(document, usd, report)
+    return Exported(document, usd, report, fingerprint, dependencies.files)
 
 
 def _asset_extras(

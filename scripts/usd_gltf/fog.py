@@ -11,7 +11,7 @@ import numpy as np
 from pxr import Usd
 
 from .gltf_document import number, numbers
-from .report import Report
+from .report import Notebook
 from .stage import Frames, changes
 
 _LARGEST = float(np.finfo(np.float32).max)
@@ -19,7 +19,7 @@ _STEEPEST = 0.9999
 """Nearest to 1 that an anisotropy is written."""
 
 
-def read_fog(prim: Usd.Prim, frames: Frames, report: Report) -> dict | None:
+def read_fog(prim: Usd.Prim, frames: Frames, report: Notebook) -> dict | None:
     """`extras.usdFog` of a Volume; None if it has no authored extinction, or (reported) no sense."""
     reader = _Reader(prim, frames, report)
     extinction = reader.value("extinction")
@@ -54,7 +54,7 @@ def read_fog(prim: Usd.Prim, frames: Frames, report: Report) -> dict | None:
 class _Reader:
     """Reads attributes at the first frame; bad numbers are reported and made harmless."""
 
-    def __init__(self, prim: Usd.Prim, frames: Frames, report: Report) -> None:
+    def __init__(self, prim: Usd.Prim, frames: Frames, report: Notebook) -> None:
         self.prim, self.frames, self.report = prim, frames, report
 
     def first(self, attribute: Usd.Attribute):

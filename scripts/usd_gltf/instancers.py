@@ -8,7 +8,7 @@ import numpy as np
 from pxr import Usd, UsdGeom
 
 from .primvars import as_rows
-from .report import Report
+from .report import Notebook
 from .stage import Frames
 from .transforms import column
 
@@ -22,7 +22,7 @@ class Placements:
     """(n, 4, 4), or (frames, n, 4, 4) if the instancer moves; without the prototype's own matrix."""
 
 
-def read_placements(prim: Usd.Prim, frames: Frames, report: Report) -> dict[int, Placements]:
+def read_placements(prim: Usd.Prim, frames: Frames, report: Notebook) -> dict[int, Placements]:
     """Placements of each prototype, by its index in `prototypes`."""
     instancer = UsdGeom.PointInstancer(prim)
     path = prim.GetPath()
@@ -40,7 +40,7 @@ def read_placements(prim: Usd.Prim, frames: Frames, report: Report) -> dict[int,
             matrices = np.stack([m for m, _, _ in states])
         else:
             why = "instances that appear, vanish or change prototype have no carrier; the first frame is used"
-            report.warn(path, "PointInstancer whose instances change", why)
+            report.about("animation").warn(path, "PointInstancer whose instances change", why)
     if not np.isfinite(matrices).all():
         good = np.isfinite(matrices).all(axis=(-1, -2))
         shown = shown & (good.all(axis=0) if good.ndim == 2 else good)

@@ -4,29 +4,30 @@ Area lights become emissive meshes in nits, points and spots `KHR_lights_punctua
 `directional` in lux, domes extras. Here the sizeFactor of `normalize` comes in, since it depends on
 the world-space area of one instance.
 
-Two limits that the schema leaves open: a normalized light of no size at all has a power but no
-area, and is carried as the point that it tends to (`L'/4` candela in all directions from a sphere,
-`L' cos(theta)` from a flat light); one of no width but some length is widened to a thousandth of
-its length, which changes nothing but its outline, since it is normalized.
+Lights of no size. UsdLux gives a light without area no power, unless it is normalized: then the
+limit is carried, a point (`L'/4` candela in all directions from a sphere, `L' cos(theta)` from a flat
+light), and a light of some length but no width is widened to a thousandth of its length. But
+maya-usd writes radius 0 and `treatAsPoint` for every point light, never `normalize`; arnold-usd then
+leaves Arnold's point_light normalized, and Cycles sizes a light of radius 0 as if it were (both
+`intensity/4`). So a sphere or cylinder of radius 0 counts as normalized here whatever `normalize`
+says. With a radius, `treatAsPoint` is the hint that its text says: the power stays the sphere's.
 """
 
 from __future__ import annotations
 
 import math
-from pathlib import Path
 
 import numpy as np
 
 from .gltf_document import Document, number, numbers
 from .light_inputs import SIZES, Light
 from .light_shapes import Tessellation, tessellate, world_area
+from .light_textures import LightTextures
 from .materials import Emission, Materials
-from .mesh import MeshSource
-from .report import Report
+from .mesh import GLOW, MeshSource
+from .report import Notebook
 from .stage import Frames
-from .textures import Textures
 
-_DOME_FORMATS = {".exr", ".hdr", ".png", ".jpg", ".jpeg"}
 _THIN = 1e-3
 
 
@@ -37,13 +38,13 @@ class LightCarriers:
         self,
         document: Document,
         materials: Materials,
-        textures: Textures,
+        pictures: LightTextures,
         frames: Frames,
         meters_per_unit: float,
         normalize_area: str,
-        report: Report,
+        report: Notebook,
     ) -> None:
-        self.document, self.materials, self.textures = document, materials, textures
+        self.document, self.materials, self.pictures = document, materials, pictures
         self.frames, self.report = frames, report
         self.square_metres = meters_per_unit**2
         self.normalize_unit = 1.0 if normalize_area == "stage" else self.square_metres
@@ -69,25 +70,33 @@ class LightCarriers:
     # -- area lights -----------------------------------------------------------------------------
 
     def _area_light(self, light: Light, node: dict, extras: dict, world: np.ndarray) -> None:
-        size = light.size
+        size, normalize = light.size, light.normalize
         area = _each_frame(world, lambda linear: world_area(light.type, size, linear))
         if np.max(area) <= 0.0:
-            if not light.normalize or max(size.values()) > 0.0 and min(size.values()) > 0.0:
-                why = "its area is 0 and it is not normalized" if not light.normalize else "its scale is 0"
+            if min(size.values()) > 0.0:
+                self.report.warn(light.path, f"{light.type} emits nothing", "its scale is 0")
+                return
+            normalize = self._normalized_anyway(light)
+            if not np.any(normalize):
+                why = "its area is 0 and it is not normalized"
                 self.report.warn(light.path, f"{light.type} emits nothing", why)
                 return
             if max(size.values()) <= 0.0:
-                self._without_size(light, node, extras)
+                self._without_size(light, normalize, node, extras)
                 return
             size = {name: max(value, _THIN * max(size.values())) for name, value in size.items()}
             area = _each_frame(world, lambda linear: world_area(light.type, size, linear))
-        nits = self._writable(light, self._normalized(light, area))
-        if light.treat_as_point:
+        nits = self._normalized(light.rgb, normalize, area)
+        texture = None
+        if light.texture is not None:
+            texture, factor = self.pictures.rect(light)
+            nits = nits * factor
+            if not np.any(factor):
+                return
+        nits = _settled(self._writable(light, nits))
+        if light.is_point:
             self._punctual(light, node, extras, _times(nits, area * (self.square_metres / 4)))
             return
-        texture = None
-        if light.texture is not None and light.type == "RectLight":
-            texture = self.textures.light_texture(light.path, light.texture)
         if light.type == "SphereLight":
             extras["radius"] = number(light.size["radius"])
         self._animated(extras, nits)
@@ -95,12 +104,23 @@ class LightCarriers:
         primitive = {**self._tessellated(light.type, size, texture is not None), "material": material}
         node["mesh"] = self.document.shared("meshes", {"name": light.type, "primitives": [primitive]})
 
-    def _normalized(self, light: Light, area) -> np.ndarray:
+    def _normalized_anyway(self, light: Light) -> np.ndarray:
+        """`normalize`, or True for a sphere or cylinder of radius 0 (see above)."""
+        if light.type not in ("SphereLight", "CylinderLight") or light.size["radius"] > 0.0:
+            return light.normalize
+        if not (light.is_point or light.is_line or np.all(light.normalize)):
+            shape = "line" if light.size.get("length") else "point"
+            why = f"UsdLux gives it no power; it is carried as the {shape} that Arnold and Cycles light with"
+            self.report.warn(light.path, f"{light.type} of radius 0", f"{why}, as if normalized")
+        return np.ones((), bool)
+
+    def _normalized(self, rgb: np.ndarray, normalize: np.ndarray, area) -> np.ndarray:
         """The emission over the sizeFactor: world-space area where `normalize` asks for it."""
-        if not light.normalize:
-            return light.rgb
+        if not np.any(normalize):
+            return rgb
         area = np.asarray(area, dtype=float) * self.normalize_unit
-        return _times(light.rgb, np.where(area > 0, 1.0 / np.maximum(area, 1e-300), 0.0))
+        inverse = np.where(area > 0, 1.0 / np.maximum(area, 1e-300), 0.0)
+        return _times(rgb, np.where(normalize, inverse, 1.0))
 
     def _writable(self, light: Light, rgb: np.ndarray) -> np.ndarray:
         """Emission that a 32-bit number holds."""
@@ -110,9 +130,9 @@ class LightCarriers:
             self.report.warn(light.path, "emission too strong", why)
         return np.minimum(rgb, top)
 
-    def _without_size(self, light: Light, node: dict, extras: dict) -> None:
+    def _without_size(self, light: Light, normalize: np.ndarray, node: dict, extras: dict) -> None:
         """The limit of a normalized light that shrinks to a point."""
-        power = light.rgb * (self.square_metres / self.normalize_unit)
+        power = _times(light.rgb, np.where(normalize, self.square_metres / self.normalize_unit, 0.0))
         if light.type in ("RectLight", "DiskLight"):
             shaping = light.shaping or {"coneAngle": 90.0, "coneSoftness": 0.0, "focus": 0.0, "focusTint": [0.0] * 3}
             if light.shaping and any(light.shaping["focusTint"]):
@@ -147,15 +167,17 @@ class LightCarriers:
         self, light: Light, node: dict, extras: dict, world: np.ndarray, mesh: MeshSource
     ) -> None:
         rgb = light.rgb
-        if light.normalize:
+        if np.any(light.normalize):
             area = _each_frame(world, mesh.area)
             if np.max(area) <= 0.0:
                 self.report.warn(light.path, f"{light.type} emits nothing", "it has no area")
-            rgb = self._writable(light, self._normalized(light, area))
+            rgb = _settled(self._writable(light, self._normalized(light.rgb, light.normalize, area)))
         if rgb.ndim == 2 and len({piece.glow for piece in mesh.pieces_lit(light.material_sync)}) > 1:
             why = "its parts glow differently; the first frame's values are used"
             self.report.warn(light.path, "animated light on a mesh of several materials", why)
             rgb = rgb[0]
+        if light.material_sync == GLOW:
+            mesh.report_still_glow(self.report)
         lit = mesh.lit_primitives(self.materials, light, rgb)
         if rgb.ndim == 2 and lit:
             self._animated(extras, rgb * np.array(mesh.pieces_lit(light.material_sync)[0].glow))
@@ -165,6 +187,7 @@ class LightCarriers:
 
     def _punctual(self, light: Light, node: dict, extras: dict, candela: np.ndarray) -> None:
         """A point, or a spot if the light is shaped."""
+        candela = _settled(candela)
         self._animated(extras, candela)
         shaping = extras.get("shaping")
         if shaping is None:
@@ -179,16 +202,13 @@ class LightCarriers:
         self._khr_light(node, "spot", _first(candela), spot)
 
     def _distant(self, light: Light, node: dict, extras: dict) -> None:
-        """Lux on a facing surface: `L pi sin^2(angle/2)`; a sun of no angle is given in lux."""
-        half = math.radians(light.angle_deg) / 2
-        facing = math.pi * math.sin(min(half, math.pi / 2)) ** 2 if half > 0 else 1.0
-        if light.normalize:
-            if half > math.pi / 2:
-                facing /= math.pi * (2 - math.sin(half) ** 2)
-            elif half > 0:
-                facing = 1.0
-        lux = light.rgb * facing
-        extras["angle"] = number(light.angle_deg)
+        """Lux on a surface that faces it; the angle of the first frame, the lux of every frame."""
+        facing = np.vectorize(_facing)(light.angle_deg, light.normalize)
+        lux = _settled(_times(light.rgb, facing))
+        extras["angle"] = number(light.angle_deg.flat[0])
+        if light.angle_deg.ndim:
+            why = "the first frame's is kept; every frame has its own illuminance"
+            self.report.warn(light.path, "animated inputs:angle", why)
         self._animated(extras, lux)
         self._khr_light(node, "directional", _first(lux))
         if light.shaping is not None:
@@ -196,20 +216,16 @@ class LightCarriers:
             extras.pop("shaping", None)
 
     def _dome(self, light: Light, extras: dict) -> None:
-        extras["radiance"] = numbers(_first(light.rgb))
-        self._animated(extras, light.rgb)
-        extras.pop("shaping", None)
-        if light.texture is None:
-            return
-        found = self.textures.read(light.path, light.texture)
-        if found is None:
-            return
-        name, data, existing = found
-        if Path(name).suffix.lower() not in _DOME_FORMATS:
-            why = f"{name}: only .exr, .hdr, .png and .jpg have a carrier; the dome is exported untextured"
-            self.report.warn(light.path, "dome texture's format", why)
-            return
-        extras["texture"] = self.document.side_file(name, data, existing)
+        rgb = light.rgb
+        if light.texture is not None:
+            uri, factor = self.pictures.dome(light)
+            rgb = _settled(self._writable(light, rgb * factor))
+            if uri is not None:
+                extras["texture"] = uri
+        extras["radiance"] = numbers(_first(rgb))
+        self._animated(extras, rgb)
+        if extras.pop("shaping", None) is not None:
+            self.report.warn(light.path, "shaping of a DomeLight", "it has no position to be shaped from")
 
     def _khr_light(self, node: dict, kind: str, rgb: np.ndarray, spot: dict | None = None) -> None:
         strength = float(np.max(rgb))
@@ -241,10 +257,27 @@ def _each_frame(world: np.ndarray, area) -> np.ndarray | float:
     return np.array([area(matrix) for matrix in linear])
 
 
+def _facing(angle_deg: float, normalize: bool) -> float:
+    """Lux on a facing surface for each nit: `pi sin^2(angle/2)` over the sizeFactor. A sun of no
+    angle is given in lux."""
+    half = math.radians(angle_deg) / 2
+    if half <= 0.0:
+        return 1.0
+    facing = math.pi * math.sin(min(half, math.pi / 2)) ** 2
+    if not normalize:
+        return facing
+    return 1.0 if half <= math.pi / 2 else 1.0 / (2 - math.sin(half) ** 2)
+
+
 def _times(rgb: np.ndarray, factor) -> np.ndarray:
     """rgb, (3,) or (frames, 3), times a number or one number for each frame."""
     factor = np.asarray(factor, dtype=float)
-    return rgb * (factor[:, None] if factor.ndim else factor)
+    return rgb * (factor[..., None] if factor.ndim else factor)
+
+
+def _settled(rgb: np.ndarray) -> np.ndarray:
+    """One row for (frames, 3) whose rows differ by no more than single precision's noise."""
+    return rgb[0] if rgb.ndim == 2 and np.allclose(rgb, rgb[0], rtol=1e-6, atol=0) else rgb
 
 
 def _first(rgb: np.ndarray) -> np.ndarray:

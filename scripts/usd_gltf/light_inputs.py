@@ -4,6 +4,9 @@
 
 in nits (usdLux/schema.usda, "Quantities and Units"). What is read here leaves out the sizeFactor,
 which depends on where an instance of the light stands (`light_carriers`).
+
+The diffuse and specular multipliers are no part of the formula and have no carrier. A light whose
+diffuse multiplier is m is carried m times as bright, which is right for everything but highlights.
 """
 
 from __future__ import annotations
@@ -12,10 +15,14 @@ import math
 from dataclasses import dataclass, field
 
 import numpy as np
-from pxr import Gf, Sdf, Usd, UsdLux
+from pxr import Sdf, Usd, UsdLux
 
-from .report import Report
-from .stage import Frames, changes
+from . import light_visibility
+from .light_attributes import LightAttributes, is_finite
+from .light_losses import report_losses
+from .report import Notebook
+from .stage import Frames
+from .vendors import report_others
 
 SIZES = {
     "RectLight": ("width", "height"),
@@ -25,11 +32,18 @@ SIZES = {
 }
 """Size inputs of the intrinsic area lights, in local units."""
 
-_FALLBACKS = {
-    "intensity": 1.0, "exposure": 0.0, "color": Gf.Vec3f(1), "normalize": False,
-    "enableColorTemperature": False, "colorTemperature": 6500.0, "width": 1.0, "height": 1.0,
-    "length": 1.0, "radius": 0.5, "angle": 0.53, "diffuse": 1.0, "specular": 1.0,
-}  # fmt: skip
+_AXES = {
+    "RectLight": ("width", "height", None),
+    "DiskLight": ("radius", "radius", "radius"),
+    "SphereLight": ("radius", "radius", "radius"),
+    "CylinderLight": ("length", "radius", "radius"),
+}
+"""Which size stretches the shape along X, Y and Z."""
+
+_THINNEST = 1e-6
+"""A size that shrinks to 0 shrinks to this share of its largest: a matrix of scale 0 has no axes."""
+
+_BRIGHTNESS = ("intensity", "exposure", "color", "enableColorTemperature", "colorTemperature", "diffuse")
 
 
 @dataclass
@@ -40,16 +54,26 @@ class Light:
     type: str
     rgb: np.ndarray
     """Emission before the sizeFactor: (3,), or (frames, 3) if it is animated."""
-    normalize: bool
+    normalize: np.ndarray
+    """Whether the sizeFactor applies: (), or (frames,) if it is animated."""
     size: dict[str, float] = field(default_factory=dict)
+    """Its size in local units; where it is animated, the largest of all frames."""
+    stretch: np.ndarray | None = None
+    """(frames, 4, 4): what `size` is scaled by, if it is animated."""
     shaping: dict | None = None
-    angle_deg: float = 0.0
-    treat_as_point: bool = False
+    angle_deg: np.ndarray = field(default_factory=lambda: np.zeros(()))
+    """Full angle of a DistantLight: (), or (frames,)."""
+    is_point: bool = False
+    """Whether `treatAsPoint` is set."""
+    is_line: bool = False
+    """Whether `treatAsLine` is set."""
     force: bool = False
     texture: Usd.Attribute | None = None
+    texture_format: str = "automatic"
     pole_z: bool = False
     material_sync: str = "noMaterialResponse"
     inputs: dict = field(default_factory=dict)
+    visibility: dict = field(default_factory=dict)
 
     @property
     def extras(self) -> dict:
@@ -61,6 +85,8 @@ class Light:
             extras["shaping"] = self.shaping
         if self.force:
             extras["force"] = True
+        if self.visibility:
+            extras["visibility"] = self.visibility
         return extras
 
 
@@ -73,140 +99,133 @@ def light_type(prim: Usd.Prim) -> str | None:
     return str(prim.GetTypeName()) or "Light" if prim.HasAPI(UsdLux.LightAPI) else None
 
 
-def read_light(prim: Usd.Prim, kind: str, frames: Frames, report: Report) -> Light:
+def read_light(prim: Usd.Prim, kind: str, frames: Frames, report: Notebook) -> Light:
     """Read all inputs of a light; bad numbers are reported and made harmless."""
-    reader = _Reader(prim, frames, report)
+    inputs = LightAttributes(prim, frames, report)
     light = Light(
         path=str(prim.GetPath()),
         type=kind,
-        rgb=reader.emission(),
-        normalize=bool(reader.at_first("normalize")),
-        size={name: reader.size(name) for name in SIZES.get(kind, ())},
-        shaping=reader.shaping(kind),
-        # The schema names this one without `inputs:`.
-        treat_as_point=kind == "SphereLight" and bool(prim.GetAttribute("treatAsPoint").Get(frames.first)),
-        force=bool(prim.GetAttribute("candelabra:force").Get(frames.first) or False),
+        rgb=_emission(inputs),
+        normalize=_track([bool(inputs.at("normalize", code)) for code in _codes(inputs, "normalize")]),
+        shaping=_shaping(inputs, kind),
+        # The schema names these without `inputs:`.
+        is_point=kind == "SphereLight" and _flag(prim, "treatAsPoint", frames),
+        is_line=kind == "CylinderLight" and _flag(prim, "treatAsLine", frames),
+        force=_flag(prim, "candelabra:force", frames),
         material_sync=str(prim.GetAttribute("light:materialSyncMode").Get() or "noMaterialResponse"),
-        inputs=_verbatim(prim, frames),
+        inputs=_verbatim(inputs),
+        visibility=light_visibility.read_visibility(prim, frames.first, report),
     )
+    _measure(light, inputs)
     if kind == "DistantLight":
-        light.angle_deg = min(max(reader.size("angle"), 0.0), 360.0)
-    texture = prim.GetAttribute("inputs:texture:file")
-    asset = texture.Get(frames.first) if texture else None
-    if asset is not None and asset.path:
-        light.texture = texture
+        light.angle_deg = _track([min(inputs.size("angle", code), 360.0) for code in _codes(inputs, "angle")])
+    if kind in ("RectLight", "DomeLight", "DomeLight_1"):
+        light.texture = inputs.asset("texture:file")
+        light.texture_format = str(inputs.first("texture:format"))
     if kind == "DomeLight_1":
         pole = prim.GetAttribute("poleAxis").Get() or "scene"
         up = prim.GetStage().GetMetadata("upAxis")
         light.pole_z = pole == "Z" or (pole == "scene" and up == "Z")
-    _report_unsupported(prim, kind, frames, report)
+    report_losses(inputs)
+    read = inputs.names | light_visibility.NAMES | {"filters", "treatAsPoint", "treatAsLine"}
+    report_others(prim, read, frames.first, report)
     return light
 
 
-class _Reader:
-    """Reads `inputs:*` of one prim with UsdLux's fallbacks."""
+def _measure(light: Light, inputs: LightAttributes) -> None:
+    """The light's size; one that is animated becomes the largest, and a scale for each frame."""
+    names = SIZES.get(light.type, ())
+    codes = _codes(inputs, *names)
+    rows = {name: np.array([inputs.size(name, code) for code in codes]) for name in names}
+    light.size = {name: float(row.max()) for name, row in rows.items()}
+    if any((row != row[0]).any() for row in rows.values()):
+        light.stretch = np.tile(np.eye(4), (len(codes), 1, 1))
+        for axis, name in enumerate(_AXES[light.type]):
+            if name is not None and light.size[name] > 0:
+                light.stretch[:, axis, axis] = np.maximum(rows[name] / light.size[name], _THINNEST)
 
-    def __init__(self, prim: Usd.Prim, frames: Frames, report: Report) -> None:
-        self.prim, self.frames, self.report = prim, frames, report
 
-    def at(self, name: str, code: float):
-        """Value at a time code, the schema's fallback if it has none."""
-        attribute = self.prim.GetAttribute(f"inputs:{name}")
-        value = attribute.Get(code) if attribute else None
-        return _FALLBACKS[name] if value is None else value
+def _codes(inputs: LightAttributes, *names: str) -> tuple[float, ...]:
+    """All frames if one of the inputs may vary, else the first."""
+    attributes = (inputs.attribute(name) for name in names)
+    varying = any(attribute and attribute.ValueMightBeTimeVarying() for attribute in attributes)
+    return inputs.frames.codes if varying else inputs.frames.codes[:1]
 
-    def at_first(self, name: str):
-        """Value at the first frame; a value that varies is reported."""
-        attribute = self.prim.GetAttribute(f"inputs:{name}")
-        if changes(attribute, self.frames):
-            self.report.warn(self.prim.GetPath(), f"animated inputs:{name}", "the first frame's value is used")
-        return self.at(name, self.frames.first)
 
-    def size(self, name: str) -> float:
-        """A length or an angle that is finite and not negative."""
-        value = float(self.at_first(name))
-        if not 0 <= value < 1e30:
-            self.report.warn(self.prim.GetPath(), f"inputs:{name} is not a size", f"it is {value}; 0 is used")
-            return 0.0
-        return value
+def _track(values: list) -> np.ndarray:
+    """An array of one value for each frame, or one value if all are the same."""
+    array = np.array(values)
+    return array[0] if (array == array[0]).all() else array
 
-    def emission(self) -> np.ndarray:
-        """intensity * 2^exposure * color * temperature; one row for each frame if it varies."""
-        names = ("intensity", "exposure", "color", "enableColorTemperature", "colorTemperature")
-        animated = any(
-            attribute and attribute.ValueMightBeTimeVarying()
-            for attribute in (self.prim.GetAttribute(f"inputs:{name}") for name in names)
+
+def _flag(prim: Usd.Prim, name: str, frames: Frames) -> bool:
+    attribute = prim.GetAttribute(name)
+    return bool(attribute.Get(frames.first)) if attribute else False
+
+
+def _emission(inputs: LightAttributes) -> np.ndarray:
+    """intensity * 2^exposure * color * temperature; one row for each frame if it varies."""
+    rows = np.array([_emission_at(inputs, code) for code in _codes(inputs, *_BRIGHTNESS)])
+    good = np.isfinite(rows) & (rows >= 0) & (rows <= float(np.finfo(np.float32).max))
+    if not good.all():
+        inputs.report.warn(
+            inputs.path,
+            "emission is negative or not finite",
+            "intensity, exposure, color and temperature give "
+            f"{rows[~good.all(axis=1)][0].tolist()}; 0 is used for such components",
         )
-        codes = self.frames.codes if animated else self.frames.codes[:1]
-        rows = np.array([self._emission_at(code) for code in codes])
-        good = np.isfinite(rows) & (rows >= 0) & (rows <= float(np.finfo(np.float32).max))
-        if not good.all():
-            self.report.warn(
-                self.prim.GetPath(),
-                "emission is negative or not finite",
-                "intensity, exposure, color and temperature give "
-                f"{rows[~good.all(axis=1)][0].tolist()}; 0 is used for such components",
-            )
-            rows = np.where(good, rows, 0.0)
-        return rows[0] if len(rows) == 1 or (rows == rows[0]).all() else rows
-
-    def _emission_at(self, code: float) -> np.ndarray:
-        exposure = float(self.at("exposure", code))
-        scale = float(self.at("intensity", code)) * (2.0**exposure if abs(exposure) < 1000 else math.nan)
-        color = np.array(self.at("color", code), dtype=float)
-        if self.at("enableColorTemperature", code):
-            kelvin = float(self.at("colorTemperature", code))
-            if not math.isfinite(kelvin):
-                return np.full(3, math.nan)
-            if not 1000 <= kelvin <= 10000:
-                why = f"{kelvin:g} K is outside UsdLux's 1000 to 10000 K; the nearer end is used"
-                self.report.warn(self.prim.GetPath(), "color temperature out of range", why)
-            color = color * np.array(UsdLux.BlackbodyTemperatureAsRgb(kelvin), dtype=float)
-        with np.errstate(invalid="ignore", over="ignore"):
-            return scale * color
-
-    def shaping(self, kind: str) -> dict | None:
-        """`extras.usdLux.shaping` in degrees, or None if the light is not shaped."""
-        prim = self.prim
-
-        def value(name: str, fallback):
-            attribute = prim.GetAttribute(f"inputs:shaping:{name}")
-            found = attribute.Get(self.frames.first) if attribute else None
-            if changes(attribute, self.frames):
-                self.report.warn(prim.GetPath(), f"animated inputs:shaping:{name}", "the first frame's value is used")
-            return fallback if found is None else found
-
-        # Without the applied schema there is no fallback of 90 degrees, and no cone.
-        cone = float(value("cone:angle", 180.0))
-        softness = float(value("cone:softness", 0.0))
-        focus = float(value("focus", 0.0))
-        tint = [float(c) for c in value("focusTint", (0.0, 0.0, 0.0))]
-        if not all(map(math.isfinite, [cone, softness, focus, *tint])):
-            self.report.warn(prim.GetPath(), "shaping is not finite", "the light is exported unshaped")
-            return None
-        cone, focus = min(max(cone, 0.0), 180.0), max(focus, 0.0)
-        softness = min(max(softness, 0.0), 1.0) if prim.GetAttribute("inputs:shaping:cone:angle") else 0.0
-        widest = 90.0 if kind in ("RectLight", "DiskLight") else 180.0
-        if cone >= widest and softness == 0.0 and focus == 0.0:
-            return None
-        return {
-            "coneAngle": cone,
-            "coneSoftness": softness,
-            "focus": focus,
-            "focusTint": [max(c, 0.0) for c in tint],
-        }
+        rows = np.where(good, rows, 0.0)
+    return rows[0] if (rows == rows[0]).all() else rows
 
 
-def _verbatim(prim: Usd.Prim, frames: Frames) -> dict:
+def _emission_at(inputs: LightAttributes, code: float) -> np.ndarray:
+    exposure = inputs.at("exposure", code)
+    scale = inputs.at("intensity", code) * (2.0**exposure if abs(exposure) < 1000 else math.nan)
+    scale *= inputs.at("diffuse", code)
+    color = np.array(inputs.at("color", code), dtype=float)
+    if inputs.at("enableColorTemperature", code):
+        kelvin = inputs.at("colorTemperature", code)
+        if not is_finite(kelvin):
+            return np.full(3, math.nan)
+        if not 1000 <= kelvin <= 10000:
+            why = f"{kelvin:g} K is outside UsdLux's 1000 to 10000 K; the nearer end is used"
+            inputs.report.warn(inputs.path, "color temperature out of range", why)
+        color = color * np.array(UsdLux.BlackbodyTemperatureAsRgb(kelvin), dtype=float)
+    with np.errstate(invalid="ignore", over="ignore"):
+        return scale * color
+
+
+def _shaping(inputs: LightAttributes, kind: str) -> dict | None:
+    """`extras.usdLux.shaping` in degrees, or None if the light is not shaped."""
+    cone, softness = inputs.still("shaping:cone:angle"), inputs.still("shaping:cone:softness")
+    focus, tint = inputs.still("shaping:focus"), [float(c) for c in inputs.still("shaping:focusTint")]
+    if not is_finite(cone, softness, focus, *tint):
+        inputs.report.warn(inputs.path, "shaping is not finite", "the light is exported unshaped")
+        return None
+    cone, focus = min(max(cone, 0.0), 180.0), max(focus, 0.0)
+    softness = min(max(softness, 0.0), 1.0) if inputs.attribute("shaping:cone:angle") else 0.0
+    widest = 90.0 if kind in ("RectLight", "DiskLight") else 180.0
+    if cone >= widest and softness == 0.0 and focus == 0.0:
+        return None
+    return {
+        "coneAngle": cone,
+        "coneSoftness": softness,
+        "focus": focus,
+        "focusTint": [max(c, 0.0) for c in tint],
+    }
+
+
+def _verbatim(inputs: LightAttributes) -> dict:
     """Authored inputs at the first frame as JSON values, for people and for diffs."""
+    prim, code = inputs.prim, inputs.frames.first
     authored = {}
     for attribute in prim.GetAuthoredPropertiesInNamespace("inputs"):
         if isinstance(attribute, Usd.Attribute):
-            authored[attribute.GetName().removeprefix("inputs:")] = _json(attribute.Get(frames.first))
-    for name in ("light:materialSyncMode", "poleAxis"):
+            authored[attribute.GetName().removeprefix("inputs:")] = _json(attribute.Get(code))
+    for name in ("light:materialSyncMode", "poleAxis", "treatAsPoint", "treatAsLine", *sorted(inputs.used)):
         attribute = prim.GetAttribute(name)
         if attribute and attribute.HasAuthoredValue():
-            authored[name] = _json(attribute.Get(frames.first))
+            authored.setdefault(name, _json(attribute.Get(code)))
     return dict(sorted(authored.items()))
 
 
@@ -222,48 +241,3 @@ def _json(value):
         return [_json(item) for item in value]
     except TypeError:
         return str(value)
-
-
-def _report_unsupported(prim: Usd.Prim, kind: str, frames: Frames, report: Report) -> None:
-    """Everything about a light that the file can hold only as extras, or not at all."""
-    path = prim.GetPath()
-
-    def authored(name: str):
-        attribute = prim.GetAttribute(name)
-        return attribute.Get(frames.first) if attribute and attribute.HasAuthoredValue() else None
-
-    for name in ("diffuse", "specular"):
-        value = authored(f"inputs:{name}")
-        if value is not None and value != 1.0:
-            report.warn(path, f"inputs:{name}", "a non-physical control without a carrier")
-    ies = authored("inputs:shaping:ies:file")
-    if ies is not None and ies.path:
-        report.warn(path, "IES profile", f"{ies.path} is kept in extras only; the light is exported without it")
-    shadow = {name: authored(f"inputs:shadow:{name}") for name in ("enable", "color", "distance")}
-    if shadow["enable"] is False:
-        report.warn(path, "shadow:enable = false", "a non-physical control without a carrier")
-    if shadow["color"] is not None and any(shadow["color"]):
-        report.warn(path, "shadow:color", "a non-physical control without a carrier")
-    if shadow["distance"] is not None and shadow["distance"] >= 0:
-        report.warn(path, "shadow:distance", "a non-physical control without a carrier")
-    filters = prim.GetRelationship("light:filters")
-    if filters and filters.GetTargets():
-        report.warn(path, "light filters", "they have no carrier; the light is exported unfiltered")
-    for link in ("lightLink", "shadowLink"):
-        collection = Usd.CollectionAPI(prim, link)
-        root = prim.GetAttribute(f"collection:{link}:includeRoot").Get()
-        listed = prim.GetRelationship(f"collection:{link}:includes"), prim.GetRelationship(
-            f"collection:{link}:excludes"
-        )
-        if collection and (root is False or any(rel and rel.GetTargets() for rel in listed)):
-            report.warn(path, link, "linking has no carrier; the light lights everything")
-    for attribute in prim.GetAuthoredPropertiesInNamespace("inputs"):
-        if isinstance(attribute, Usd.Attribute) and attribute.HasAuthoredConnections():
-            report.warn(path, f"connected {attribute.GetName()}", "shader networks on lights have no carrier")
-    format_ = authored("inputs:texture:format")
-    if kind.startswith("DomeLight") and format_ not in (None, "automatic", "latlong"):
-        report.warn(path, f"texture:format {format_}", "only latitude-longitude has a carrier; read as such")
-    if kind.startswith("DomeLight"):
-        portals = prim.GetRelationship("portals")
-        if portals and portals.GetTargets():
-            report.warn(path, "dome portals", "they only guide sampling and have no carrier")

@@ -13,7 +13,7 @@ import numpy as np
 from pxr import Sdf, Usd, UsdShade
 
 from .gltf_document import Document, number, numbers
-from .report import Report
+from .report import Notebook
 
 if TYPE_CHECKING:
     from .mesh import Piece
@@ -42,6 +42,8 @@ class Look:
     normal_texture: dict | None = None
     occlusion_texture: dict | None = None
     emission: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    emission_keys: np.ndarray | None = None
+    """(frames, 3) nits, if the glow is animated; `emission` is the first frame's."""
     emission_texture: dict | None = None
     alpha_mode: str = "OPAQUE"
     alpha_cutoff: float = 0.5
@@ -56,7 +58,7 @@ class Materials:
     """Resolves bindings to looks, and looks to glTF materials."""
 
     def __init__(
-        self, document: Document, read_surface: Callable[[UsdShade.Material], Look], report: Report
+        self, document: Document, read_surface: Callable[[UsdShade.Material], Look], report: Notebook
     ) -> None:
         self.document, self.read_surface, self.report = document, read_surface, report
         self._looks: dict[Sdf.Path, Look] = {}

@@ -20,7 +20,7 @@ from .gltf_document import Document
 from .light_inputs import Light
 from .materials import Emission, Look, Materials
 from .primvars import CornerValues, as_rows, read_normals, read_primvar
-from .report import Report
+from .report import Notebook
 from .stage import Frames, changes
 from .triangulate import triangulate
 
@@ -68,6 +68,21 @@ class MeshSource:
         """glTF primitives of a mesh that is no light."""
         return [{**piece.primitive, "material": materials.index(piece)} for piece in self.pieces]
 
+    def glow_keys(self) -> np.ndarray | None:
+        """(frames, 3) nits of a mesh whose glow is animated, and the same in all its pieces."""
+        first = self.pieces[0].look.emission_keys
+        same = all(piece.look.emission_keys is not None for piece in self.pieces) and all(
+            np.array_equal(piece.look.emission_keys, first) for piece in self.pieces
+        )
+        return first if same else None
+
+    def report_still_glow(self, report: Notebook) -> None:
+        """Say which materials have an animated glow whose first frame is used."""
+        for look in (piece.look for piece in self.pieces):
+            if look.emission_keys is not None:
+                why = "one node carries one animation for all parts of a mesh; the first frame is used"
+                report.warn(look.path, "animated emissiveColor", why)
+
     def pieces_lit(self, material_sync: str) -> list[Glow]:
         """How each piece glows under `light:materialSyncMode`."""
         white = Glow((1.0, 1.0, 1.0), None)
@@ -85,14 +100,14 @@ class MeshSource:
         for piece, glow in zip(self.pieces, self.pieces_lit(light.material_sync), strict=True):
             if not any(glow.glow):
                 why = f"{piece.look.path} does not glow, and materialGlowTintsLight multiplies by its glow"
-                materials.report.warn(light.path, "mesh light emits nothing", why)
+                materials.report.about("lights").warn(light.path, "mesh light emits nothing", why)
             emission = Emission(first * np.array(glow.glow), glow.texture, rgb.ndim == 2)
             if light.material_sync == "noMaterialResponse":
                 index = materials.light_material(emission, piece.double_sided)
             else:
                 if light.material_sync == "independent" and any(piece.look.emission):
                     why = "the eye is to see the material's own glow; it sees the light's"
-                    materials.report.warn(light.path, "materialSyncMode = independent", why)
+                    materials.report.about("lights").warn(light.path, "materialSyncMode = independent", why)
                 index = materials.index(piece, emission)
             primitives.append({**piece.primitive, "material": index})
         return primitives
@@ -101,7 +116,7 @@ class MeshSource:
 class MeshReader:
     """Reads meshes once: what USD shares (instances) or repeats is stored once."""
 
-    def __init__(self, document: Document, materials: Materials, frames: Frames, report: Report) -> None:
+    def __init__(self, document: Document, materials: Materials, frames: Frames, report: Notebook) -> None:
         self.document, self.materials = document, materials
         self.frames, self.code, self.report = frames, frames.first, report
         self._read: dict[tuple, MeshSource | None] = {}
@@ -186,7 +201,7 @@ class MeshReader:
         }
         for name, attribute in attributes.items():
             if changes(attribute, self.frames):
-                self.report.warn(path, f"animated {name}", "deforming meshes have no carrier; the first frame is used")
+                self.report.about("animation").warn(path, f"animated {name}", "deforming meshes have no carrier; the first frame is used")
         points = as_rows(attributes["points"].Get(self.code), 3)
         counts = as_rows(attributes["faceVertexCounts"].Get(self.code), 1, int)
         corners = as_rows(attributes["faceVertexIndices"].Get(self.code), 1, int)

@@ -15,7 +15,7 @@ from .light_carriers import LightCarriers
 from .materials import Materials
 from .mesh import MeshSource
 from .prim_tree import Prim
-from .report import Report
+from .report import Notebook
 from .stage import Frames
 from .transforms import SHEAR_TOLERANCE, decompose, split_shear
 
@@ -31,7 +31,7 @@ class NodeWriter:
         materials: Materials,
         carriers: LightCarriers,
         frames: Frames,
-        report: Report,
+        report: Notebook,
     ) -> None:
         self.document, self.materials, self.carriers = document, materials, carriers
         self.frames, self.report = frames, report
@@ -78,6 +78,12 @@ class NodeWriter:
             self.carriers.carry(prim.light, node, world, prim.mesh)
         elif prim.mesh is not None:
             node["mesh"] = self._mesh(prim.mesh)
+            keys = prim.mesh.glow_keys()
+            if keys is not None:
+                values = {"times": numbers(self.frames.seconds), "rgb": [numbers(row) for row in keys]}
+                node["extras"]["usdLux"] = {"type": "MeshLight", "inputs": {}, "values": values}
+            else:
+                prim.mesh.report_still_glow(self.report.about("lights"))
         children = [self._prim(child, path + child.path[len(prim.path) :], world) for child in prim.children]
         for prototype, placements in prim.instances:
             children += self._instances(prototype, placements, path, world)
@@ -121,30 +127,35 @@ class NodeWriter:
         return node, self.document.node({"name": f"{name}_shear", "children": [index], **outside})
 
     def _moving(self, path: str, name: str, local: np.ndarray) -> tuple[dict, int]:
-        """A node that follows `local` (frames, 4, 4), and its index."""
-        translation, rotation, scale, shear = decompose(local)
-        if shear.max() > SHEAR_TOLERANCE:
-            why = "translation, rotation and scale cannot hold it over time; the nearest ones are used"
-            self.report.warn(path, "animated shear", why)
-        node = {"name": name, "extras": {"usdPath": path}, **_place(translation[0], rotation[0], scale[0])}
+        """A node that follows `local` (frames, 4, 4), and the index of the node to hang under the
+        parent. Shear takes two nodes, and is exact at every frame."""
+        sheared = decompose(local)[3].max() > SHEAR_TOLERANCE
+        outside, inside = split_shear(local) if sheared else (None, local)
+        node = {"name": name, "extras": {"usdPath": path}}
+        index = self._following(node, inside)
+        if outside is None:
+            return node, index
+        return node, self._following({"name": f"{name}_shear", "children": [index]}, outside)
+
+    def _following(self, node: dict, local: np.ndarray) -> int:
+        """Index of `node`, made to follow matrices without shear."""
+        translation, rotation, scale, _ = decompose(local)
+        node.update(_place(translation[0], rotation[0], scale[0]))
         index = self.document.node(node)
         tracks = {"translation": translation, "rotation": rotation, "scale": scale}
         for key, values in tracks.items():
             if varies(values):
                 node.setdefault(key, list(_DEFAULTS[key]))
         self.report.count("animation channels", animate(self.document, index, self.frames.seconds, tracks))
-        return node, index
+        return index
 
 
 def _still(local: np.ndarray) -> tuple[dict, dict | None]:
-    """Node properties that hold a matrix; a second set, for a node around it, if it has shear.
-
-    One node cannot hold shear, but two can: a rotated scale around a rotation.
-    """
+    """Node properties that hold a matrix; a second set, for a node around it, if it has shear."""
     translation, rotation, scale, shear = decompose(local[None])
     if shear[0] <= SHEAR_TOLERANCE:
         return _place(translation[0], rotation[0], scale[0]), None
-    outer, inner = (decompose(matrix[None]) for matrix in split_shear(local))
+    outer, inner = (decompose(matrix) for matrix in split_shear(local[None]))
     return _place(*(part[0] for part in inner[:3])), _place(*(part[0] for part in outer[:3]))
 
 

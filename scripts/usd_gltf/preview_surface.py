@@ -9,11 +9,12 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+import numpy as np
 from pxr import Sdf, UsdShade
 
 from .gltf_document import number, numbers
 from .materials import Look
-from .report import Report
+from .report import Notebook
 from .stage import Frames, changes
 from .textures import TextureRead, Textures
 
@@ -29,12 +30,14 @@ class Value:
     constant: object = None
     texture: TextureRead | None = None
     display_color: bool = False
+    varies: bool = False
+    """Whether `constant` is a list of one value for each frame."""
 
 
 class PreviewSurfaces:
     """Reads materials; `Materials` keeps the looks."""
 
-    def __init__(self, textures: Textures, frames: Frames, report: Report) -> None:
+    def __init__(self, textures: Textures, frames: Frames, report: Notebook) -> None:
         self.textures, self.frames, self.report = textures, frames, report
         self.code = frames.first
 
@@ -111,12 +114,12 @@ class PreviewSurfaces:
         scales = [*main.scale[:3], mask.scale[3] if mask else alpha]
         fits = all(0 <= s <= 1 for s in scales) and (mask is not None or look.alpha_mode == "OPAQUE")
         if color is not None and color.is_plain("rgb", srgb=True) and same and fits:
-            image = self.textures.plain(look.path, color)
+            image = self.textures.plain(color)
             look.base_color = tuple(scales)
         else:
             planes = [(color, c) for c in _rgb(color)] if color else [float(c) for c in constant]
             planes.append((mask, mask.channel[0]) if mask else float(alpha))
-            image = self.textures.packed(look.path, f"{_stem(main)}_base", planes, srgb=True)
+            image = self.textures.packed(f"{_stem(main)}_base", planes, srgb=True)
             look.base_color = (1.0, 1.0, 1.0, 1.0)
         self._same_mapping(look.path, color, mask)
         look.base_texture = self._info(look, main, image)
@@ -138,7 +141,7 @@ class PreviewSurfaces:
             and (metal is not None or metallic == 0.0)
         )
         if as_is:
-            image = self.textures.plain(look.path, main)
+            image = self.textures.plain(main)
             look.roughness = rough.scale[1]
             look.metallic = metal.scale[2] if metal else 0.0
         else:
@@ -148,7 +151,7 @@ class PreviewSurfaces:
                 (metal, metal.channel[0]) if metal else float(metallic),
                 1.0,
             ]
-            image = self.textures.packed(look.path, f"{_stem(main)}_roughness_metallic", planes, srgb=False)
+            image = self.textures.packed(f"{_stem(main)}_roughness_metallic", planes, srgb=False)
             look.roughness, look.metallic = 1.0, 1.0
         self._same_mapping(look.path, rough, metal)
         look.metallic_roughness_texture = self._info(look, main, image)
@@ -157,18 +160,18 @@ class PreviewSurfaces:
         emissive = read["emissiveColor"]
         texture = emissive.texture
         if texture is None:
-            look.emission = self._color(emissive, (0.0, 0.0, 0.0), limit=math.inf)
+            keys = emissive.constant if emissive.varies else [emissive.constant]
+            rows = [self._color(Value(key), (0.0, 0.0, 0.0), limit=math.inf) for key in keys]
+            look.emission = rows[0]
+            look.emission_keys = np.array(rows) if emissive.varies else None
             return
-        look.emission = tuple(max(s, 0.0) for s in texture.scale[:3])
-        if texture.is_plain("rgb", srgb=True):
-            image = self.textures.plain(look.path, texture)
+        if texture.is_plain("rgb", srgb=True) and min(texture.scale[:3]) >= 0 and "black" not in texture.wraps:
+            image = self.textures.plain(texture)
+            look.emission = texture.scale[:3]
         else:
-            # Bright texels are brought into [0, 1] by the factor, which takes them out again.
-            top = max(max(abs(s) + abs(b) for s, b in zip(texture.scale, texture.bias, strict=True)), 1e-6)
-            toned = _rescaled(texture, 1 / top)
-            planes = [(toned, c) for c in _rgb(texture)]
-            image = self.textures.packed(look.path, f"{_stem(texture)}_emission", [*planes, 1.0], srgb=True)
-            look.emission = (top, top, top)
+            planes = [(texture, c) for c in _rgb(texture)]
+            image, factor = self.textures.baked(look.path, f"{_stem(texture)}_emission", planes)
+            look.emission = tuple(float(f) for f in factor)
         look.emission_texture = self._info(look, texture, image)
 
     def _normal_and_occlusion(self, look: Look, read: dict[str, Value]) -> None:
@@ -176,21 +179,21 @@ class PreviewSurfaces:
         if normal is not None:
             standard = normal.scale[:3] == (2.0,) * 3 and normal.bias[:3] == (-1.0,) * 3
             if standard and normal.channel == "rgb" and normal.color_space != "sRGB":
-                image = self.textures.plain(look.path, normal)
+                image = self.textures.plain(normal)
             else:
                 planes = [(_rescaled(normal, 0.5, 0.5), c) for c in _rgb(normal)]
-                image = self.textures.packed(look.path, f"{_stem(normal)}_normal", [*planes, 1.0], srgb=False)
+                image = self.textures.packed(f"{_stem(normal)}_normal", [*planes, 1.0], srgb=False)
             look.normal_texture = self._info(look, normal, image)
         if occlusion is not None:
             if occlusion.is_plain("r", srgb=False) and occlusion.scale[0] == 1.0:
-                image = self.textures.plain(look.path, occlusion)
+                image = self.textures.plain(occlusion)
             else:
                 planes = [(occlusion, occlusion.channel[0]), 1.0, 1.0, 1.0]
-                image = self.textures.packed(look.path, f"{_stem(occlusion)}_occlusion", planes, srgb=False)
+                image = self.textures.packed(f"{_stem(occlusion)}_occlusion", planes, srgb=False)
             look.occlusion_texture = self._info(look, occlusion, image)
 
-    def _info(self, look: Look, read: TextureRead, image: int | None) -> dict | None:
-        return None if image is None else self.textures.info(look.path, read, image, look.uv_names)
+    def _info(self, look: Look, read: TextureRead, image: int) -> dict:
+        return self.textures.info(look.path, read, image, look.uv_names)
 
     def _same_mapping(self, path: str, a: TextureRead | None, b: TextureRead | None) -> None:
         if a and b and (a.uv_name, a.transform, a.wraps) != (b.uv_name, b.transform, b.wraps):
@@ -201,6 +204,8 @@ class PreviewSurfaces:
 
     def _value(self, path: str, shader: UsdShade.Shader, name: str) -> Value:
         """What the input reads, through interfaces and node graphs."""
+        # What glows is a light, whatever says so.
+        report = self.report.about("lights") if name == "emissiveColor" else self.report
         found = shader.GetInput(name)
         if not found:
             return Value()
@@ -209,19 +214,21 @@ class PreviewSurfaces:
             return Value()
         attribute = attributes[0]
         if not UsdShade.Output.IsOutput(attribute):
+            if changes(attribute, self.frames) and name == "emissiveColor":
+                return Value([attribute.Get(code) for code in self.frames.codes], varies=True)
             if changes(attribute, self.frames):
-                self.report.warn(path, f"animated {name}", "materials have no animation; the first frame is used")
+                report.warn(path, f"animated {name}", "materials have no animation; the first frame is used")
             return Value(constant=attribute.Get(self.code))
         source = UsdShade.Shader(attribute.GetPrim())
         kind = str(source.GetIdAttr().Get() or "")
         if kind == "UsdUVTexture":
             channel = UsdShade.Output(attribute).GetBaseName()
-            return self._texture(path, source, channel)
+            return self._texture(path, source, channel, report)
         if kind.startswith("UsdPrimvarReader_float3") and name == "diffuseColor":
             if self._plain(source, "varname") in ("displayColor", "primvars:displayColor"):
                 return Value(display_color=True)
         what = f"{name} from {kind or 'an unknown shader'}"
-        self.report.warn(path, what, "only constants, UsdUVTexture and displayColor are read; the default is used")
+        report.warn(path, what, "only constants, UsdUVTexture and displayColor are read; the default is used")
         return Value()
 
     def _plain(self, shader: UsdShade.Shader, name: str, fallback=None):
@@ -233,7 +240,7 @@ class PreviewSurfaces:
         value = attributes[0].Get(self.code)
         return fallback if value is None else value
 
-    def _texture(self, path: str, shader: UsdShade.Shader, channel: str) -> Value:
+    def _texture(self, path: str, shader: UsdShade.Shader, channel: str, report: Notebook) -> Value:
         """A UsdUVTexture; its fallback colour if the file is missing or unreadable."""
         fallback = tuple(self._plain(shader, "fallback", (0.0, 0.0, 0.0, 1.0)))
         constant = Value(constant=fallback[:3] if channel == "rgb" else fallback["rgba".find(channel[:1])])
@@ -241,17 +248,13 @@ class PreviewSurfaces:
         attributes = UsdShade.Utils.GetValueProducingAttributes(found) if found else []
         asset = attributes[0].Get(self.code) if attributes else None
         if not isinstance(asset, Sdf.AssetPath) or not asset.path:
-            self.report.warn(path, "missing texture", f"{shader.GetPath()} names no file; its fallback is used")
-            return constant
-        file = self.textures.read(path, attributes[0])
-        if file is None:
+            report.warn(path, "missing texture", f"{shader.GetPath()} names no file; its fallback is used")
             return constant
         uv_name, transform = self._mapping(path, shader)
-        name, data, existing = file
-        read = TextureRead(
-            name=name,
-            data=data,
-            existing=existing,
+        plan = TextureRead(
+            name="",
+            data=b"",
+            existing=None,
             channel=channel if channel in ("r", "g", "b", "a") else "rgb",
             scale=tuple(map(float, self._plain(shader, "scale", _ONE))),
             bias=tuple(map(float, self._plain(shader, "bias", _ZERO))),
@@ -260,7 +263,9 @@ class PreviewSurfaces:
             uv_name=uv_name,
             transform=transform,
         )
-        return Value(constant=constant.constant, texture=read) if self.textures.usable(path, read) else constant
+        if changes(attributes[0], self.frames):
+            report.warn(path, "animated texture file", "materials have no animation; the first frame's file is used")
+        return Value(constant=constant.constant, texture=self.textures.read(path, attributes[0], plan, report))
 
     def _mapping(self, path: str, shader: UsdShade.Shader) -> tuple[str, tuple | None]:
         """The primvar that the texture is read with, and its UsdTransform2d."""

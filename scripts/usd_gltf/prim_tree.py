@@ -18,7 +18,7 @@ from .fog import read_fog
 from .instancers import Placements, read_placements
 from .light_inputs import Light, light_type, read_light
 from .mesh import MeshReader, MeshSource
-from .report import Report
+from .report import Notebook
 from .stage import PREDICATE, PROTOTYPE_PREDICATE, Frames, changes
 from .transforms import column
 
@@ -60,10 +60,11 @@ class PrimTree:
         frames: Frames,
         purposes: tuple[str, ...],
         meters_per_unit: float,
-        report: Report,
+        report: Notebook,
     ) -> None:
         self.stage, self.meshes, self.frames = stage, meshes, frames
         self.purposes, self.meters_per_unit, self.report = purposes, meters_per_unit, report
+        self.lights = report.about("lights")
         self._prototypes: dict[str, Prim | None] = {}
         self._open: set[str] = set()
         self._lights: dict[tuple[str, str], Light] = {}
@@ -83,8 +84,9 @@ class PrimTree:
         found = [self._compile(prim, None, PREDICATE) for prim in top]
         for target, light in self._geometry_lights.items():
             if target not in self._lit_geometry:
-                why = f"its geometry {target} is not there, not shown, or no mesh"
-                self.report.warn(light.GetPath(), "GeometryLight emits nothing", why)
+                there = bool(self.stage.GetPrimAtPath(target))
+                why = f"its geometry {target} is {'not shown, or no mesh' if there else 'not there'}"
+                self.lights.warn(light.GetPath(), "GeometryLight emits nothing", why)
         return [prim for prim in found if prim is not None]
 
     def _compile(self, prim: Usd.Prim, purpose, predicate) -> Prim | None:
@@ -97,7 +99,8 @@ class PrimTree:
             imageable = UsdGeom.Imageable(prim)
             visibility = imageable.GetVisibilityAttr()
             if changes(visibility, self.frames):
-                self.report.warn(path, "animated visibility", "it has no carrier; the first frame's is used")
+                report = self.lights if _holds_light(prim) else self.report.about("animation")
+                report.warn(path, "animated visibility", "it has no carrier; the first frame's is used")
             if visibility.Get(self.frames.first) == UsdGeom.Tokens.invisible:
                 self.report.count("invisible prims")
                 return None
@@ -120,7 +123,9 @@ class PrimTree:
                 if below is not None:
                     compiled.children.append(below)
         if compiled.light is not None and compiled.light.pole_z:
-            self._turn_dome(compiled)
+            _insert(compiled, _POLE_Z)
+        if compiled.light is not None and compiled.light.stretch is not None:
+            _insert(compiled, compiled.light.stretch)
         if compiled.is_empty:
             return None
         compiled.lit = (
@@ -148,7 +153,7 @@ class PrimTree:
         kind = str(prim.GetTypeName())
         geometry_light = self._geometry_lights.get(str(path))
         if kind == "Volume":
-            compiled.fog = read_fog(prim, self.frames, self.report)
+            compiled.fog = read_fog(prim, self.frames, self.report.about("other"))
         if prim.IsA(UsdGeom.Mesh) or kind in gprims.TYPES:
             compiled.mesh = self.meshes.read(prim)
             light_prim = geometry_light or prim
@@ -156,33 +161,27 @@ class PrimTree:
                 compiled.light = self._light(light_prim, "MeshLight")
                 self._lit_geometry.add(str(path))
         elif prim.IsA(UsdGeom.Camera):
-            compiled.camera = read_camera(prim, self.frames, self.meters_per_unit, self.report)
+            compiled.camera = read_camera(prim, self.frames, self.meters_per_unit, self.report.about("cameras"))
         elif kind == "GeometryLight":
             if not prim.GetRelationship("geometry").GetTargets():
-                self.report.warn(path, "GeometryLight emits nothing", "its geometry relationship is empty")
+                self.lights.warn(path, "GeometryLight emits nothing", "its geometry relationship is empty")
         elif light_type(prim) is not None:
             compiled.light = self._light(prim, light_type(prim))
         elif prim.IsA(UsdLux.LightFilter):
-            self.report.warn(path, kind, "light filters have no carrier")
+            self.lights.warn(path, kind, "light filters have no carrier")
         elif compiled.fog is None and (prim.IsA(UsdGeom.Gprim) or kind in ("Skeleton", "Volume")):
             self.report.warn(path, kind, "this kind of geometry has no carrier; it is left out")
         elif kind and not prim.GetPrimTypeInfo().GetSchemaType():
-            self.report.warn(path, f"unknown type {kind}", "no schema is registered for it")
+            report = self.lights if "Light" in kind else self.report.about("other")
+            report.warn(path, f"unknown type {kind}", "no schema is registered for it")
 
     def _light(self, prim: Usd.Prim, kind: str) -> Light:
         """The light read once for all instances that share its prim."""
         source = prim.GetPrimInPrototype() if prim.IsInstanceProxy() else prim
         key = (str(source.GetPath()), kind)
         if key not in self._lights:
-            self._lights[key] = read_light(prim, kind, self.frames, self.report)
+            self._lights[key] = read_light(prim, kind, self.frames, self.lights)
         return self._lights[key]
-
-    @staticmethod
-    def _turn_dome(compiled: Prim) -> None:
-        """Turn a dome to its pole axis, but not what is below it."""
-        compiled.local = compiled.local @ _POLE_Z
-        for child in compiled.children:
-            child.local = _POLE_Z.T @ child.local
 
     def _instances(self, prim: Usd.Prim, compiled: Prim) -> None:
         """The prototypes of a PointInstancer and where they are put."""
@@ -213,3 +212,16 @@ class PrimTree:
             self._prototypes[target] = self._compile(prim, None, PROTOTYPE_PREDICATE)
             self._open.discard(target)
         return self._prototypes[target]
+
+
+def _insert(compiled: Prim, matrix: np.ndarray) -> None:
+    """Put a matrix, or one for each frame, between a prim and its own content, but not its children."""
+    compiled.local = compiled.local @ matrix
+    for child in compiled.children:
+        if not child.resets:
+            child.local = np.linalg.inv(matrix) @ child.local
+
+
+def _holds_light(prim: Usd.Prim) -> bool:
+    """Whether the prim or anything below it is a light."""
+    return any(light_type(below) is not None for below in Usd.PrimRange(prim, PROTOTYPE_PREDICATE))

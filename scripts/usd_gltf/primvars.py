@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from pxr import Usd, UsdGeom
 
-from .report import Report
+from .report import Notebook
 
 
 @dataclass
@@ -51,14 +51,14 @@ def spread(
 
 
 def read_primvar(
-    prim: Usd.Prim, name: str, width: int, code: float, counts: np.ndarray, corners: np.ndarray, report: Report
+    prim: Usd.Prim, name: str, width: int, code: float, counts: np.ndarray, corners: np.ndarray, report: Notebook
 ) -> CornerValues | None:
     """The primvar `name` (inherited ones too) with `width` numbers a value; None if there is none."""
     primvar = UsdGeom.PrimvarsAPI(prim).FindPrimvarWithInheritance(name)
     if not primvar or not primvar.HasValue():
         return None
     if primvar.ValueMightBeTimeVarying() and primvar.GetAttr().GetNumTimeSamples() > 1:
-        report.warn(prim.GetPath(), f"animated primvars:{name}", "the first frame's values are used")
+        report.about("animation").warn(prim.GetPath(), f"animated primvars:{name}", "the first frame's values are used")
     interpolation = primvar.GetInterpolation()
     values = as_rows(primvar.Get(code), width).reshape(-1, width)
     indices = as_rows(primvar.GetIndices(code), 1, int) if primvar.IsIndexed() else None
@@ -71,7 +71,7 @@ def read_primvar(
 
 
 def read_normals(
-    prim: Usd.Prim, code: float, counts: np.ndarray, corners: np.ndarray, report: Report
+    prim: Usd.Prim, code: float, counts: np.ndarray, corners: np.ndarray, report: Notebook
 ) -> CornerValues | None:
     """`primvars:normals`, else the `normals` attribute of a point-based prim."""
     found = read_primvar(prim, "normals", 3, code, counts, corners, report)

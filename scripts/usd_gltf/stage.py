@@ -1,4 +1,4 @@
-"""Opening a stage: payloads, variants, the frames to export, and what composition complained of."""
+"""Opening a stage: payloads, variants, and the frames to export."""
 
 from __future__ import annotations
 
@@ -10,7 +10,8 @@ from pathlib import Path
 import numpy as np
 from pxr import Sdf, Tf, Usd, UsdGeom
 
-from .report import ExportError, Report
+from .composition import report_composition
+from .report import ExportError, Notebook
 
 PREDICATE = Usd.TraverseInstanceProxies(
     Usd.PrimIsActive & Usd.PrimIsDefined & Usd.PrimIsLoaded & ~Usd.PrimIsAbstract
@@ -66,7 +67,7 @@ def changes(attribute: Usd.Attribute, frames: Frames) -> bool:
     return any(attribute.Get(code) != first for code in frames.codes[1:])
 
 
-def open_stage(path: Path, options: Options, report: Report) -> Usd.Stage:
+def open_stage(path: Path, options: Options, report: Notebook) -> Usd.Stage:
     """Open with all payloads, set the variants, and report what did not compose."""
     if not path.is_file():
         raise ExportError(f"{path}: no such file")
@@ -76,12 +77,7 @@ def open_stage(path: Path, options: Options, report: Report) -> Usd.Stage:
         raise ExportError(f"{path}: USD cannot read it: {first_line(error, path)}") from None
     for prim_path, variant_set, selection in options.variants:
         _select_variant(stage, path, prim_path, variant_set, selection)
-    for error in stage.GetCompositionErrors():
-        text = " ".join(str(error).split())
-        kind = "missing layer" if "Could not open asset" in text else "composition error"
-        if kind == "missing layer" and "for payload" in text:
-            kind = "missing payload"
-        report.warn(error.rootSite.path, kind, text)
+    report_composition(stage, report)
     return stage
 
 
@@ -101,7 +97,7 @@ def _select_variant(stage: Usd.Stage, file: Path, prim_path: str, name: str, sel
         variant_set.SetVariantSelection(selection)
 
 
-def choose_frames(stage: Usd.Stage, options: Options, report: Report) -> Frames:
+def choose_frames(stage: Usd.Stage, options: Options, report: Notebook) -> Frames:
     """The frames asked for, else the stage's own range, else the range of its time samples."""
     per_second = stage.GetTimeCodesPerSecond()
     if not (math.isfinite(per_second) and per_second > 0):
@@ -115,7 +111,7 @@ def choose_frames(stage: Usd.Stage, options: Options, report: Report) -> Frames:
         start, end = _sampled_range(stage)
         if end > start:
             why = f"frames {start:g}-{end:g} are taken from the time samples; say --frames to choose"
-            report.warn("/", "no startTimeCode and endTimeCode", why)
+            report.note("/", "no startTimeCode and endTimeCode", why)
     if not (math.isfinite(start) and math.isfinite(end)) or end < start:
         report.warn("/", "startTimeCode and endTimeCode are no range", f"{start:g}-{end:g}; the first is used")
         start = end = start if math.isfinite(start) else 0.0

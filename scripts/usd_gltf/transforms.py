@@ -83,14 +83,31 @@ def continuous(quaternions: np.ndarray) -> np.ndarray:
     return quaternions * signs[:, None]
 
 
-def split_shear(matrix: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Two matrices without shear whose product is `matrix`: a rotated scale, and a rotation."""
-    u, s, vt = np.linalg.svd(matrix[:3, :3])
-    if np.linalg.det(vt) < 0:
-        vt[2] *= -1
-        u[:, 2] *= -1
-    outer, inner = np.eye(4), np.eye(4)
-    outer[:3, :3] = u * s
-    outer[:3, 3] = matrix[:3, 3]
-    inner[:3, :3] = vt
+def split_shear(matrices: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Two stacks without shear whose product is `matrices` (n, 4, 4): rotated scales, and rotations.
+
+    One node cannot hold shear, but two can. Along the stack the axes keep their order and sign as
+    far as they can.
+    """
+    u, s, vt = np.linalg.svd(matrices[:, :3, :3])
+    for at in range(1, len(vt)):
+        order = _matched(vt[at - 1] @ vt[at].T)
+        u[at], s[at], vt[at] = u[at][:, order], s[at][order], vt[at][order]
+        sign = np.where(np.einsum("ij,ij->i", vt[at - 1], vt[at]) < 0, -1.0, 1.0)
+        u[at], vt[at] = u[at] * sign, vt[at] * sign[:, None]
+    turned = np.linalg.det(vt) < 0
+    vt[turned, 2] *= -1
+    u[turned, :, 2] *= -1
+    outer, inner = (np.tile(np.eye(4), (len(matrices), 1, 1)) for _ in range(2))
+    outer[:, :3, :3] = u * s[:, None, :]
+    outer[:, :3, 3] = matrices[:, :3, 3]
+    inner[:, :3, :3] = vt
     return outer, inner
+
+
+def _matched(cosines: np.ndarray) -> list[int]:
+    """For each row of a 3x3 matrix, in turn, the column left with the largest absolute value."""
+    order: list[int] = []
+    for row in np.abs(cosines):
+        order.append(max((c for c in range(3) if c not in order), key=lambda c: row[c]))
+    return order

@@ -13,8 +13,10 @@ use super::side::{Side, SideError, Surveyed};
 use super::totals::{Tally, Totals};
 use super::{Diff, SideName};
 use crate::light_tree::LightTree;
+use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 use std::collections::HashMap;
+use std::path::PathBuf;
 
 /// What a comparison is to find out besides what changed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -28,10 +30,15 @@ pub struct DiffOptions {
 /// Compares two versions.
 ///
 /// # Errors
-/// A scene with a light that no tree can hold.
+/// A scene with a light that no tree can hold; a tree that contradicts the other version, of which it
+/// says that it is the same.
 pub fn compare(before: &Side, after: &Side, options: &DiffOptions) -> Result<Diff, SideError> {
     let surveyed = Surveyed::both(before, after)?;
     let sides = [&surveyed[0], &surveyed[1]];
+    if sides[0].contradicts(sides[1]) {
+        let [before, after] = [before, after].map(|side| PathBuf::from(&side.name().file));
+        return Err(SideError::Contradiction { before, after });
+    }
     let names = [before, after].map(|side| side.name().clone());
     let looks_closer = *options != DiffOptions::default();
     if sides[0].has_rows_of(sides[1]) && !looks_closer {
@@ -53,9 +60,15 @@ pub fn compare(before: &Side, after: &Side, options: &DiffOptions) -> Result<Dif
     let (tree_before, tree_after) =
         rayon::join(|| sides[0].tree(&mut room_before), || sides[1].tree(&mut room_after));
     let trees = [&tree_before, &tree_after];
-    let (picking, moved) = compare_picking(sides, trees, lights, &pairs);
-    let describer = Describer::new(scenes, trees);
-    let apart = scenes.map_or_else(HashMap::new, |scenes| apart(scenes, &pairs.changed));
+    let origins = [before, after].map(Side::origin);
+    let shift = (origins[1] - origins[0]).as_vec3();
+    let (picking, moved) = match shift == Vec3::ZERO {
+        true => compare_picking(sides, trees, lights, &pairs),
+        // No point is among the lights of both.
+        false => (None, vec![0.0; pairs.count]),
+    };
+    let describer = Describer::new(scenes, trees, shift);
+    let apart = scenes.map_or_else(HashMap::new, |scenes| apart(scenes, &pairs.changed, shift));
     let weigher = Weigher::new(trees, tallies, &moved, &apart);
     let found = pairs.changed.par_iter().map(|pair| weigher.change(pair, &describer));
     let mut changes: Vec<Change> = found.flatten().collect();
@@ -68,7 +81,7 @@ pub fn compare(before: &Side, after: &Side, options: &DiffOptions) -> Result<Dif
     let marked = if options.unchanged { pairs.unchanged.as_slice() } else { &[] };
     let heat = scenes.filter(|_| options.heat).and_then(|scenes| heat::map(scenes, trees));
     let [before, after] = names;
-    Ok(Diff {
+    let diff = Diff {
         before,
         after,
         totals: totals(tallies, &changes, pairs.count),
@@ -76,7 +89,25 @@ pub fn compare(before: &Side, after: &Side, options: &DiffOptions) -> Result<Dif
         changes,
         unchanged: marked.par_iter().filter_map(mark).collect(),
         heat,
-    })
+    };
+    Ok(in_world(diff, origins[0]))
+}
+
+/// What is shown, with all positions in the world of the files.
+fn in_world(mut diff: Diff, origin: DVec3) -> Diff {
+    let move_out = |at: &mut [f32; 3]| {
+        *at = (Vec3::from(*at).as_dvec3() + origin).as_vec3().to_array();
+    };
+    for change in &mut diff.changes {
+        let cards = [&mut change.before, &mut change.after];
+        let places = cards.into_iter().flatten().filter_map(|card| card.place.as_mut());
+        places.for_each(|place| move_out(&mut place.center_m));
+    }
+    diff.unchanged.iter_mut().for_each(|mark| move_out(&mut mark.center_m));
+    if let Some(picking) = &mut diff.picking {
+        move_out(&mut picking.worst_at_m);
+    }
+    diff
 }
 
 /// Nothing differs.

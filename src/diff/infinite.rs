@@ -6,7 +6,7 @@ use super::profile::{add_texture, short};
 use super::scene_side::kind;
 use crate::emitter::infinite_lights;
 use crate::light_tree::{LightLook, LightRow};
-use crate::scene::{Keys, LightKind, Pose, Scene};
+use crate::scene::{Keys, LightKind, Pose, Posing, Scene};
 use glam::Vec3;
 use std::collections::HashMap;
 
@@ -27,27 +27,27 @@ pub(super) fn find(scene: &Scene, pose: &Pose, frames: &[i32]) -> Vec<Infinite> 
     let shining = infinite_lights(scene, pose);
     let illuminance: HashMap<usize, f64> =
         shining.iter().map(|light| (light.light, light.importance(Vec3::ZERO))).collect();
-    let moving = scene.moving_nodes();
+    let ways = ways(scene, frames);
     let lights = scene.lights.iter().enumerate().filter(|&(row, light)| {
         light.kind.is_infinite() && scene.peak_rgb_of_light(row as u32).max_element() > 0.0
     });
     let found = lights.map(|(row, light)| {
         let rgb = scene.rgb_of_light(row as u32, pose);
-        let (moves, varies) = (moving[light.node as usize], light.values.is_some());
+        let way = ways.get(&light.node);
+        let (moves, varies) = (way.is_some(), light.values.as_ref().is_some_and(Keys::varies));
         let profile = profile(scene, &light.kind);
         let mut hasher = blake3::Hasher::new();
         hasher.update(&profile.pattern.to_le_bytes());
         hasher.update(&profile.half_angle_rad.unwrap_or(0.0).to_le_bytes());
         hasher.update(bytemuck::bytes_of(&rgb));
         hasher.update(bytemuck::bytes_of(&pose.world(light.node).matrix3.to_cols_array()));
-        if let Some(Keys { times_s, values, interpolation }) = &light.values {
+        if let Some(Keys { times_s, values, interpolation }) =
+            light.values.as_ref().filter(|keys| keys.varies())
+        {
             hasher.update(bytemuck::cast_slice(times_s)).update(bytemuck::cast_slice(values));
             hasher.update(&[*interpolation as u8]);
         }
-        for &frame in if moves { frames } else { &[] } {
-            let pose = scene.pose_at(scene.timeline.seconds_at(f64::from(frame)));
-            hasher.update(bytemuck::bytes_of(&pose.world(light.node).matrix3.to_cols_array()));
-        }
+        hasher.update(way.map_or(&[], |way| way.as_slice()));
         let bit = |is: bool, bit: u32| if is { bit } else { 0 };
         Infinite {
             light: row as u32,
@@ -60,6 +60,23 @@ pub(super) fn find(scene: &Scene, pose: &Pose, frames: &[i32]) -> Vec<Infinite> 
         }
     });
     found.collect()
+}
+
+/// What the nodes of lights at infinity do that move, by node: one pose a frame for all of them.
+fn ways(scene: &Scene, frames: &[i32]) -> HashMap<u32, [u8; 32]> {
+    let moving = scene.moving_nodes();
+    let infinite = scene.lights.iter().filter(|light| light.kind.is_infinite());
+    let nodes = infinite.map(|light| light.node).filter(|&node| moving[node as usize]);
+    let mut ways: HashMap<u32, blake3::Hasher> =
+        nodes.map(|node| (node, blake3::Hasher::new())).collect();
+    let mut posing = Posing::new(scene);
+    for &frame in if ways.is_empty() { &[] } else { frames } {
+        let pose = posing.at_frame(frame);
+        for (&node, way) in &mut ways {
+            way.update(bytemuck::bytes_of(&pose.world(node).matrix3.to_cols_array()));
+        }
+    }
+    ways.into_iter().map(|(node, way)| (node, *way.finalize().as_bytes())).collect()
 }
 
 /// The picture of a dome, the size of a sun.

@@ -2,7 +2,7 @@
 
 use super::card::{Kind, LightCard};
 use crate::light_tree::{LightLook, LightRow};
-use glam::Affine3A;
+use glam::{Affine3A, Vec3, Vec3A};
 
 /// What all lights of both versions are matched by: as little as will do, for there may be millions.
 #[derive(Clone, Copy, Debug)]
@@ -54,6 +54,19 @@ pub(super) struct Described {
     pub profile: Profile,
     /// Whether it has a tree of its own, which says less of where its emitters are.
     pub placed: bool,
+}
+
+impl Described {
+    /// The same, from another origin.
+    pub fn shifted(mut self, shift: Vec3) -> Described {
+        if let Some(place) = &mut self.card.place {
+            place.center_m = (Vec3::from(place.center_m) + shift).to_array();
+        }
+        if let Some(to_world) = &mut self.to_world {
+            to_world.translation += Vec3A::from(shift);
+        }
+        self
+    }
 }
 
 impl Light<'_> {

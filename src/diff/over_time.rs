@@ -8,7 +8,7 @@ use crate::bounds::Aabb;
 use crate::emitter::LightSource;
 use crate::math::color::luminance;
 use crate::scene::Pose;
-use glam::{Affine3A, Vec3};
+use glam::{Affine3A, Vec3, Vec3A};
 use rayon::prelude::*;
 use std::collections::{BTreeSet, HashMap};
 
@@ -28,7 +28,8 @@ enum Strength {
 }
 
 /// Of pairs that change in both scenes, by their numbers: over the frames of either, one pose at a time.
-pub(super) fn apart(scenes: [&SceneSide; 2], pairs: &[Pair]) -> HashMap<u32, Apart> {
+/// `shift` is from the origin of the first scene to that of the second.
+pub(super) fn apart(scenes: [&SceneSide; 2], pairs: &[Pair], shift: Vec3) -> HashMap<u32, Apart> {
     let animated: Vec<(u32, [Animated; 2])> = pairs
         .iter()
         .filter_map(|pair| match (&pair.before, &pair.after) {
@@ -46,7 +47,8 @@ pub(super) fn apart(scenes: [&SceneSide; 2], pairs: &[Pair]) -> HashMap<u32, Apa
     for frame in frames {
         let poses = scenes.map(|side| side.pose_at(frame));
         found.par_iter_mut().zip(&animated).for_each(|(apart, (_, lights))| {
-            let [a, b] = [0, 1].map(|side| lights[side].at(scenes[side], &poses[side]));
+            let [a, mut b] = [0, 1].map(|side| lights[side].at(scenes[side], &poses[side]));
+            b.0.translation += Vec3A::from(shift);
             if a == b {
                 return;
             }

@@ -4,17 +4,17 @@ use super::card::{Kind, LightCard};
 use super::infinite::{self, Infinite};
 use super::light::{Described, Light, Profile, Row, kind_of, without_crumbs};
 use super::profile::Profiles;
+use super::side::SideError;
 use super::tree_side::place;
 use crate::bounds::{Aabb, LightBounds};
-use crate::emitter::{
-    Emitters, InfiniteLight, LightOverflow, LightSource, PosedEmitters, infinite_lights,
-};
+use crate::emitter::{Emitters, InfiniteLight, LightSource, PosedEmitters, infinite_lights};
 use crate::light_tree::LightTree;
 use crate::pipeline::{self, Survey};
 use crate::scene::{Camera, LightKind, Pose, Scene};
 use crate::store::AlignedBytes;
 use glam::Vec3;
 use std::collections::HashMap;
+use std::path::Path;
 
 /// A scene, surveyed as for a build.
 pub(super) struct SceneSide<'a> {
@@ -33,16 +33,23 @@ pub(super) struct SceneSide<'a> {
 }
 
 impl<'a> SceneSide<'a> {
-    /// Surveys a scene for some frames, its own if none are given.
+    /// Surveys a scene for some frames, its own if none are given. If there is a tree to compare it
+    /// with that says it was built from this very scene, its leaves must be the scene's.
     pub fn survey(
         scene: &'a Scene,
         camera: Option<&'a Camera>,
         frames: Option<&[i32]>,
-    ) -> Result<Self, LightOverflow> {
+        beside: Option<(&Path, LightTree<&[u8]>)>,
+    ) -> Result<Self, SideError> {
         let own = || pipeline::frames_of(scene);
         let frames = frames.map_or_else(own, <[i32]>::to_vec);
-        let emitters = Emitters::collect(scene);
-        let mut survey = pipeline::survey(scene, &emitters, &frames)?;
+        let tree = beside.as_ref().map(|(_, tree)| tree);
+        let emitters = pipeline::collect_emitters(scene, tree, &|_, _| {});
+        let mut survey = pipeline::survey(scene, &emitters, &frames)
+            .map_err(|cause| SideError::Overflow { path: scene.source.clone(), cause })?;
+        if let Some((path, tree)) = &beside {
+            pipeline::check_agreement(tree, path, scene, &survey, &[], true)?;
+        }
         survey.frames.truncate(1);
         let pose = pose_at(scene, frames[0]);
         let profiles = Profiles::of(scene, &emitters);

@@ -10,6 +10,7 @@ use crate::light_tree::LightTree;
 use crate::pipeline::{self, OpenedTree, TreeError, ViewError};
 use crate::scene::{Camera, Scene};
 use crate::store::AlignedBytes;
+use glam::DVec3;
 use std::path::{Path, PathBuf};
 
 /// A version to be compared.
@@ -48,6 +49,18 @@ pub enum SideError {
     /// A folder cannot be walked.
     #[error(transparent)]
     Folder(#[from] walkdir::Error),
+    /// Two trees say that they were built from the same content, and are not the same.
+    #[error(
+        "{} and {}: both say that they were built from the same content, but their trees differ: one of them contradicts its scene; `candelabra verify --scene` tells which",
+        before.display(),
+        after.display()
+    )]
+    Contradiction {
+        /// One file.
+        before: PathBuf,
+        /// The other.
+        after: PathBuf,
+    },
     /// One is a folder of shots, the other a file.
     #[error(
         "{}: is a folder and {} is not; compare two folders of shots, or two files",
@@ -113,11 +126,23 @@ impl Side {
         }
     }
 
-    fn tree(&self) -> Option<TreeSide<'_>> {
+    /// Where the origin of its positions is, metres.
+    pub(super) fn origin(&self) -> DVec3 {
         match &self.content {
-            Content::Tree(tree) => Some(TreeSide::new(tree)),
+            Content::Tree(tree) => pipeline::origin_of(tree),
+            Content::Scene(scene) => scene.origin,
+        }
+    }
+
+    fn opened(&self) -> Option<&OpenedTree> {
+        match &self.content {
+            Content::Tree(tree) => Some(tree),
             Content::Scene(_) => None,
         }
+    }
+
+    fn tree(&self) -> Option<TreeSide<'_>> {
+        self.opened().map(TreeSide::new)
     }
 }
 
@@ -137,10 +162,11 @@ impl<'a> Surveyed<'a> {
                 return Ok(Surveyed::Tree(Box::new(tree)));
             }
             let scene = side.scene().expect("what is no tree is a scene");
-            let surveyed = SceneSide::survey(scene, side.camera(), frames.as_deref());
-            surveyed
-                .map(|scene| Surveyed::Scene(Box::new(scene)))
-                .map_err(|cause| SideError::Overflow { path: scene.source.clone(), cause })
+            let beside = [before, after].into_iter().find_map(|other| {
+                Some((Path::new(&other.name.file), other.opened()?.by_reference()))
+            });
+            let surveyed = SceneSide::survey(scene, side.camera(), frames.as_deref(), beside)?;
+            Ok::<_, SideError>(Surveyed::Scene(Box::new(surveyed)))
         };
         let [tree_before, tree_after] = trees;
         let (before, after) =
@@ -153,6 +179,14 @@ impl<'a> Surveyed<'a> {
     pub fn has_rows_of(&self, other: &Surveyed) -> bool {
         match (self, other) {
             (Surveyed::Tree(own), Surveyed::Tree(other)) => own.has_rows_of(other),
+            _ => false,
+        }
+    }
+
+    /// Whether both are trees that say they are of one content and are not the same.
+    pub fn contradicts(&self, other: &Surveyed) -> bool {
+        match (self, other) {
+            (Surveyed::Tree(own), Surveyed::Tree(other)) => own.contradicts(other),
             _ => false,
         }
     }

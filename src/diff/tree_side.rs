@@ -9,8 +9,14 @@ use crate::bounds::{Cone, LightBounds};
 use crate::light_tree::{InstanceRow, LightRow, LightTree, Link, Node, TreeKind, TreeRow};
 use crate::pipeline::OpenedTree;
 use glam::{Affine3A, Vec3};
+use rayon::prelude::*;
 use std::collections::HashMap;
 use std::f32::consts::PI;
+
+/// The sections that list lights.
+const ROWS: [&[u8; 4]; 2] = [b"LGHT", b"PATH"];
+/// The sections that follow from the content's fingerprint.
+const TREES: [&[u8; 4]; 5] = [b"TREE", b"GRUP", b"INST", b"FRAM", b"FORC"];
 
 /// A tree, opened.
 pub(super) struct TreeSide<'a> {
@@ -37,12 +43,24 @@ impl<'a> TreeSide<'a> {
 
     /// Whether fingerprint and checksums of the lights' rows are the same.
     pub fn has_rows_of(&self, other: &TreeSide) -> bool {
-        let rows = |side: &TreeSide| {
+        self.fingerprint() == other.fingerprint() && self.has_sections_of(other, &ROWS)
+    }
+
+    /// Whether both have the fingerprint of one content and yet other trees: the same content gives
+    /// the same bytes.
+    pub fn contradicts(&self, other: &TreeSide) -> bool {
+        self.fingerprint() == other.fingerprint() && !self.has_sections_of(other, &TREES)
+    }
+
+    /// Whether lengths and checksums of some sections are the same.
+    fn has_sections_of(&self, other: &TreeSide, names: &[&[u8; 4]]) -> bool {
+        let sections = |side: &TreeSide| {
             let sections = side.tree.sections().iter();
-            let of_lights = sections.filter(|section| [b"LGHT", b"PATH"].contains(&&section.id.0));
-            of_lights.map(|section| (section.length, section.checksum)).collect::<Vec<_>>()
+            let wanted =
+                sections.filter(|section| section.length > 0 && names.contains(&&section.id.0));
+            wanted.map(|section| (section.id, section.length, section.checksum)).collect::<Vec<_>>()
         };
-        self.fingerprint() == other.fingerprint() && rows(self) == rows(other)
+        sections(self) == sections(other)
     }
 
     pub fn lights(&self) -> Vec<Light<'_>> {
@@ -68,16 +86,15 @@ fn of_row<'a, D: AsRef<[u8]>>(tree: &'a LightTree<D>, row: u32, light: &'a Light
 /// Where the lights of a tree are in its first frame.
 pub(super) struct Places<'a, D> {
     tree: &'a LightTree<D>,
-    /// By emitter; those of lights with trees of their own are not here.
-    leaves: Vec<Option<Node>>,
+    /// By ascending emitter; those of lights with trees of their own are not here.
+    leaves: Vec<(u32, Node)>,
     /// Those, by their first emitters.
     placed: HashMap<u32, &'a InstanceRow>,
 }
 
 impl<'a, D: AsRef<[u8]>> Places<'a, D> {
     pub fn find(tree: &'a LightTree<D>) -> Places<'a, D> {
-        let mut places =
-            Places { tree, leaves: vec![None; tree.emitter_count()], placed: HashMap::new() };
+        let mut places = Places { tree, leaves: Vec::new(), placed: HashMap::new() };
         let first_frame = tree.frames().first().map(|frame| frame.tree);
         for (row, own) in (0..).zip(tree.trees()) {
             let is_sampled = match TreeKind::of(own) {
@@ -94,13 +111,14 @@ impl<'a, D: AsRef<[u8]>> Places<'a, D> {
             let instance = &tree.instances()[row as usize];
             places.placed.entry(instance.first_emitter).or_insert(instance);
         }
+        places.leaves.par_sort_unstable_by_key(|&(emitter, _)| emitter);
         places
     }
 
     fn add_leaves(&mut self, row: &TreeRow) {
         for node in self.tree.groups_of(row).iter().flat_map(|group| group.nodes()) {
             match node.link() {
-                Link::Emitter(emitter) => self.leaves[emitter as usize] = Some(node),
+                Link::Emitter(emitter) => self.leaves.push((emitter, node)),
                 Link::Instance(row) => {
                     let instance = &self.tree.instances()[row as usize];
                     let below = &self.tree.trees()[instance.tree as usize];
@@ -149,12 +167,10 @@ impl<'a, D: AsRef<[u8]>> Places<'a, D> {
 
     /// In the order of the emitters, so that the tree around them does not matter.
     fn around_leaves(&self, row: &LightRow) -> Option<LightBounds> {
-        let leaves = self.leaves.get(row.first_emitter as usize..)?;
-        let own: Vec<LightBounds> = leaves[..row.emitter_count as usize]
-            .iter()
-            .flatten()
-            .map(|node| node.bounds())
-            .collect();
+        let first = self.leaves.partition_point(|&(emitter, _)| emitter < row.first_emitter);
+        let own = self.leaves[first..].iter();
+        let own = own.take_while(|(emitter, _)| emitter - row.first_emitter < row.emitter_count);
+        let own: Vec<LightBounds> = own.map(|(_, node)| node.bounds()).collect();
         match own.as_slice() {
             [] => None,
             [one] => Some(*one),

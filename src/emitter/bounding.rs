@@ -1,8 +1,8 @@
-//! The bounds of emitters, which the tree is built over.
+//! The bounds of emitters. The tree is built over them.
 //!
-//! Energy is peak radiant intensity: `I` of a point, `L A` of a triangle, `L pi r^2` of a sphere, in
-//! luminance; never quite zero, so that an emitter which a transform has flattened, or which is dark
-//! in this frame, keeps its place in the tree.
+//! Energy is the luminance of the peak radiant intensity: `I` of a point, `L A` of a triangle,
+//! `L pi r^2` of a sphere. It is never quite zero: an emitter that a transform has flattened, or that
+//! is dark in this frame, keeps its place in the tree.
 
 use super::mesh_light::MeshLight;
 use super::posed::PosedEmitters;
@@ -11,13 +11,14 @@ use super::triangle::WorldTriangle;
 use crate::bounds::{Aabb, Cone, LightBounds};
 use crate::math::Similarity;
 use crate::math::color::{Rgb, luminance};
+use crate::math::directions::{aim, mirrors};
 use crate::scene::{LightKind, Shaping};
-use glam::{Affine3A, Vec3};
+use glam::{Affine3A, DVec3, Vec3};
 use rayon::prelude::*;
 use std::f32::consts::PI;
 use std::ops::Range;
 
-/// A light that `f32` cannot hold.
+/// A light whose numbers are too large for `f32`.
 #[derive(Clone, Debug, thiserror::Error, PartialEq, Eq)]
 #[error(
     "{path}: its position or its intensity times its area is beyond the range of numbers (3e38); scale it down"
@@ -69,9 +70,9 @@ impl PosedEmitters<'_> {
         })
     }
 
-    /// Where a mesh light with a tree of its own stands: from world space to its mesh's space; and by
-    /// how much its energy has changed against what that of its own space says. `None` if its
-    /// transform bends shapes.
+    /// Where a mesh light with a tree of its own stands: the map from world space to the space of its
+    /// mesh, and its energy over the energy that the tree holds. `None` if its transform does not keep
+    /// shapes.
     pub fn placing(&self, light: u32) -> Option<(Similarity, f32)> {
         let entry = &self.emitters.lights()[light as usize];
         let LightSource::Mesh { instance: row, mesh_light } = entry.source else { return None };
@@ -93,16 +94,15 @@ impl PosedEmitters<'_> {
         let corners = mesh.triangles[mesh_light.triangle(own) as usize];
         let corners = corners.map(|c| world.transform_point3(mesh.positions[c as usize]));
         let triangle = WorldTriangle { corners };
-        let handedness = 1f32.copysign(world.matrix3.determinant());
+        let handedness = if mirrors(world) { -1.0 } else { 1.0 };
         let double_sided = self.scene.material_of(mesh_light.mesh).is_some_and(|m| m.double_sided);
         let cone = match mesh_light.shaping {
             Some(shaping) if shaping.half_angle_rad() < PI / 2.0 => {
-                let aim = (-Vec3::from(world.matrix3.z_axis)).normalize_or(-Vec3::Z);
-                Cone::spot(aim, shaping.half_angle_rad())
+                Cone::spot(aim(world).as_vec3(), shaping.half_angle_rad())
             }
             _ => {
-                let normal = triangle.area_normal().normalize_or(Vec3::Z) * handedness;
-                Cone::flat(normal, double_sided)
+                let normal = triangle.area_normal().normalize_or(DVec3::Z) * handedness;
+                Cone::flat(normal.as_vec3(), double_sided)
             }
         };
         LightBounds {
@@ -117,7 +117,8 @@ impl PosedEmitters<'_> {
         let light = &self.scene.lights[row as usize];
         let strength = luminance(self.scene.rgb_of_light(row, self.pose));
         let here = Vec3::from(self.pose.world(light.node).translation);
-        let aimed = |shaping: &Shaping| Cone::spot(self.aim(light.node), shaping.half_angle_rad());
+        let aim = self.aim(light.node).as_vec3();
+        let aimed = |shaping: &Shaping| Cone::spot(aim, shaping.half_angle_rad());
         let (radius, cone, energy) = match &light.kind {
             LightKind::Point { .. } => (0.0, Cone::ALL, strength),
             LightKind::Spot { shaping, .. } => (0.0, aimed(shaping), strength),
@@ -134,7 +135,8 @@ impl PosedEmitters<'_> {
         LightBounds { aabb, cone, energy, range_m: light.range_m.unwrap_or(f32::INFINITY) }
     }
 
-    /// The middle of an emitter, world space: what a point in a medium is chosen near to.
+    /// The middle of an emitter, world space. Points in fog are drawn by the angle under which it sees
+    /// them.
     pub fn middle(&self, emitter: u32) -> Vec3 {
         match self.emitters.place_of(emitter) {
             super::EmitterPlace::Triangle { instance, triangle } => {
@@ -149,7 +151,7 @@ impl PosedEmitters<'_> {
     }
 }
 
-/// Bounds that a tree may be built over, if they are.
+/// The bounds, if a tree may be built over them.
 fn sound(mut bounds: LightBounds) -> Option<LightBounds> {
     bounds.energy = bounds.energy.max(f32::MIN_POSITIVE);
     bounds.is_sound().then_some(bounds)

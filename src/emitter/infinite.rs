@@ -1,18 +1,24 @@
-//! Lights at infinity: suns and domes. They stay outside the boxes of the tree.
+//! Infinite lights: suns and domes. They have no place, so no box of the tree holds them.
+//!
+//! A sun stands where its node aims from: along +Z through the node's matrix as it is, as spots and
+//! cameras have it.
 
-use super::dome::Dome;
+use super::dome::{Dome, DomeSample};
 use crate::math::color::{Rgb, luminance};
+use crate::math::directions::aim;
 use crate::math::{Frame, warp};
-use crate::scene::{LightKind, Pose, Scene};
-use glam::{Quat, Vec2, Vec3};
+use crate::scene::{LightKind, Pose, Scene, Visibility};
+use glam::{Vec2, Vec3};
 use std::f32::consts::PI;
 
-/// A light at infinity, in world space.
+/// An infinite light, in world space.
 pub struct InfiniteLight<'a> {
     /// Index into [`Scene::lights`].
     pub light: usize,
     /// Whether it is left out of all estimates and sampled at every point.
     pub forced: bool,
+    /// Which rays meet it.
+    pub visibility: Visibility,
     kind: Kind<'a>,
 }
 
@@ -30,7 +36,7 @@ struct Sun {
     one_minus_cos: f32,
 }
 
-/// A direction towards a light at infinity.
+/// A direction towards an infinite light.
 #[derive(Clone, Copy, Debug)]
 pub struct InfiniteSample {
     /// Unit, world space.
@@ -41,19 +47,14 @@ pub struct InfiniteSample {
     pub pdf: Option<f32>,
 }
 
-/// The lights of a scene that are at infinity and shine in a pose.
+/// The infinite lights of a scene that shine in a pose.
 pub fn infinite_lights<'a>(scene: &'a Scene, pose: &Pose) -> Vec<InfiniteLight<'a>> {
-    let rotation = |node: u32| {
-        // The rotation that remains of a transform without its scale.
-        let (_, rotation, _) = pose.world(node).to_scale_rotation_translation();
-        if rotation.is_finite() { rotation.normalize() } else { Quat::IDENTITY }
-    };
     let kind = |light: &crate::scene::Light, rgb: Rgb| match light.kind {
         LightKind::Distant { angle_rad, .. } if rgb.max_element() > 0.0 => {
             let half_angle_rad = 0.5 * angle_rad.clamp(0.0, 2.0 * PI);
             let sine = (0.5 * half_angle_rad).sin();
             Some(Kind::Sun(Sun {
-                towards: rotation(light.node) * Vec3::Z,
+                towards: -aim(&pose.world(light.node)).as_vec3(),
                 irradiance_lux: rgb,
                 half_angle_rad,
                 one_minus_cos: 2.0 * sine * sine,
@@ -61,21 +62,22 @@ pub fn infinite_lights<'a>(scene: &'a Scene, pose: &Pose) -> Vec<InfiniteLight<'
         }
         LightKind::Dome { texture, .. } if rgb.max_element() > 0.0 => {
             let texture = texture.map(|index| &scene.textures[index as usize]);
-            Some(Kind::Dome(Box::new(Dome::new(rotation(light.node), rgb, texture))))
+            Some(Kind::Dome(Box::new(Dome::new(&pose.world(light.node), rgb, texture))))
         }
         _ => None,
     };
     let lights = scene.lights.iter().enumerate();
     let found = lights.filter_map(|(light, row)| {
         let rgb = scene.rgb_of_light(light as u32, pose);
-        Some(InfiniteLight { light, forced: row.forced, kind: kind(row, rgb)? })
+        let (forced, visibility) = (row.forced, row.visibility);
+        Some(InfiniteLight { light, forced, visibility, kind: kind(row, rgb)? })
     });
     found.collect()
 }
 
 impl InfiniteLight<'_> {
-    /// An estimate of the irradiance on a surface with this normal (zero: in any direction), lux;
-    /// 0 only where none arrives. What it competes with against the tree's importance.
+    /// An estimate of the irradiance on a surface with this normal (zero: in any direction), lux. It is 0
+    /// only where no light arrives. It competes with the importance of the tree.
     pub fn importance(&self, normal: Vec3) -> f64 {
         match &self.kind {
             Kind::Sun(sun) => {
@@ -117,13 +119,8 @@ impl InfiniteLight<'_> {
                 pdf: Some(warp::cone_pdf(sun.one_minus_cos)),
             }),
             Kind::Dome(dome) => {
-                let sample = dome.sample(normal, u)?;
-                let radiance = dome.radiance(sample.direction);
-                Some(InfiniteSample {
-                    direction: sample.direction,
-                    radiance,
-                    pdf: Some(sample.pdf),
-                })
+                let DomeSample { direction, radiance, pdf } = dome.sample(normal, u)?;
+                Some(InfiniteSample { direction, radiance, pdf: Some(pdf) })
             }
         }
     }
@@ -148,6 +145,8 @@ impl InfiniteLight<'_> {
 }
 
 impl Sun {
+    /// Whether the disk is smaller than the steps between directions of 32-bit numbers: below a half
+    /// angle of 1.4e-6 rad. It then has its irradiance, but no ray can be said to hit it.
     fn is_delta(&self) -> bool {
         self.one_minus_cos < 1e-12
     }
@@ -160,7 +159,8 @@ impl Sun {
         self.irradiance_lux / (PI * projected)
     }
 
-    /// Whether a direction points at the disk. Squared chords keep disks of 1e-4 rad exact.
+    /// Whether a direction points at the disk. Squared chords keep their digits in disks of 1e-4 rad,
+    /// where cosines are 1.
     fn contains(&self, direction: Vec3) -> bool {
         !self.is_delta() && (direction - self.towards).length_squared() <= 2.0 * self.one_minus_cos
     }

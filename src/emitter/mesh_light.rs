@@ -1,11 +1,10 @@
 //! Which triangles of a mesh emit: worked out once, however often the mesh is put into the scene.
 
-use super::texels::TexelMeans;
-use crate::math::color::{Rgb, luminance};
+use super::textured::{self, KnownMeans, LitTriangle, TextureMeans};
+use crate::math::color::Rgb;
 use crate::scene::{Instance, Mesh, Scene, Shaping};
 use rayon::prelude::*;
 use std::collections::HashMap;
-use std::sync::OnceLock;
 
 /// A mesh whose material emits, with an emission profile and a strength: what instances share.
 #[derive(Clone, Debug)]
@@ -48,8 +47,15 @@ impl MeshLight {
     }
 }
 
-/// All mesh lights of a scene, and for each instance which it is an instance of.
-pub(super) fn find(scene: &Scene) -> (Vec<MeshLight>, Vec<Option<u32>>) {
+/// All mesh lights of a scene, for each instance which it is an instance of, and the means of
+/// textures that tell which triangles emit.
+pub(super) struct MeshLights {
+    pub lights: Vec<MeshLight>,
+    pub of_instance: Vec<Option<u32>>,
+    pub means: Vec<TextureMeans>,
+}
+
+pub(super) fn find(scene: &Scene, known: &KnownMeans) -> MeshLights {
     let mut rows: HashMap<Key, u32> = HashMap::new();
     let mut firsts: Vec<(&Instance, Rgb)> = Vec::new();
     let rows_of: Vec<Option<u32>> = scene
@@ -66,14 +72,23 @@ pub(super) fn find(scene: &Scene) -> (Vec<MeshLight>, Vec<Option<u32>>) {
             })
         })
         .collect();
-    let whole_means: Vec<OnceLock<Rgb>> = scene.textures.iter().map(|_| OnceLock::new()).collect();
+    let mut meshes: Vec<u32> = firsts.iter().map(|(instance, _)| instance.mesh).collect();
+    meshes.sort_unstable();
+    meshes.dedup();
+    let means = textured::means_of(scene, &meshes, known);
     let lights: Vec<MeshLight> = firsts
         .par_iter()
-        .map(|&(instance, peak)| emitting_triangles(scene, instance, peak, &whole_means))
+        .map(|&(instance, peak)| {
+            let means = means.get(&instance.mesh).map(|means| means.lit.as_slice());
+            emitting_triangles(scene, instance, peak, means)
+        })
         .collect();
     let shines = |row: u32| lights[row as usize].count > 0;
     let of_instance = rows_of.into_iter().map(|row| row.filter(|&row| shines(row))).collect();
-    (lights, of_instance)
+    let mut means: Vec<TextureMeans> = means.into_values().collect();
+    means.sort_unstable_by_key(|means| means.fingerprint);
+    means.dedup_by_key(|means| means.fingerprint);
+    MeshLights { lights, of_instance, means }
 }
 
 /// What tells mesh lights apart, bit by bit.
@@ -98,43 +113,39 @@ impl Key {
     }
 }
 
+/// The triangles that have an area, and light: by the means of their texture, if there is one.
 fn emitting_triangles(
     scene: &Scene,
     instance: &Instance,
     peak_nits: Rgb,
-    whole_means: &[OnceLock<Rgb>],
+    means: Option<&[LitTriangle]>,
 ) -> MeshLight {
     let mesh: &Mesh = &scene.meshes[instance.mesh as usize];
-    let usage = scene.material_of(instance.mesh).and_then(|m| m.emission_texture.as_ref());
-    let textured = usage
-        .filter(|usage| mesh.uv_sets.get(usage.uv_set as usize).is_some_and(|set| !set.is_empty()));
-    let means = textured.map(|usage| {
-        let uvs = &mesh.uv_sets[usage.uv_set as usize];
-        let on_texture = |triangle: &[u32; 3]| triangle.map(|corner| uvs[corner as usize]);
-        let (texture, whole) =
-            (&scene.textures[usage.texture as usize], &whole_means[usage.texture as usize]);
-        let all = mesh.triangles.iter().map(on_texture);
-        (TexelMeans::new(texture, *usage, all, whole), on_texture)
-    });
-    let mean_of = |triangle: &[u32; 3]| match &means {
-        None => Rgb::ONE,
-        Some((means, on_texture)) => means.over(on_texture(triangle)),
-    };
-    let emission = |(triangle, corners): (usize, &[u32; 3])| {
+    let has_area = |triangle: u32| {
+        let corners = mesh.triangles[triangle as usize];
         let [a, b, c] = corners.map(|corner| mesh.positions[corner as usize].as_dvec3());
-        let has_area = (b - a).cross(c - a).length_squared() > 0.0;
-        let mean = if has_area { mean_of(corners) } else { Rgb::ZERO };
-        (luminance(mean * peak_nits) > 0.0).then_some((triangle as u32, mean))
+        (b - a).cross(c - a).length_squared() > 0.0
     };
-    let found: Vec<(u32, Rgb)> =
-        mesh.triangles.par_iter().enumerate().filter_map(emission).collect();
+    // Channel by channel: a product may be too small to be told from zero.
+    let shines = |mean: Rgb| (mean.cmpgt(Rgb::ZERO) & peak_nits.cmpgt(Rgb::ZERO)).any();
+    let found: Vec<LitTriangle> = match means {
+        None => {
+            let all = (0..mesh.triangles.len() as u32).into_par_iter();
+            let lit = all.filter(|&triangle| has_area(triangle));
+            lit.map(|triangle| LitTriangle { triangle, mean: Rgb::ONE }).collect()
+        }
+        Some(lit) => {
+            let lit = lit.par_iter().filter(|lit| shines(lit.mean) && has_area(lit.triangle));
+            lit.copied().collect()
+        }
+    };
     let all = found.len() == mesh.triangles.len();
     MeshLight {
         mesh: instance.mesh,
         shaping: instance.shaping,
         peak_nits,
         count: found.len() as u32,
-        triangles: (!all).then(|| found.iter().map(|&(triangle, _)| triangle).collect()),
-        texture_means: textured.map(|_| found.iter().map(|&(_, mean)| mean).collect()),
+        triangles: (!all).then(|| found.iter().map(|lit| lit.triangle).collect()),
+        texture_means: means.map(|_| found.iter().map(|lit| lit.mean).collect()),
     }
 }

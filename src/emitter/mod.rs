@@ -1,23 +1,29 @@
-//! Floor 2: scene -> emitters, their bounds, and light from a point of them.
+//! Floor 2: from a scene to its emitters, their bounds, and light from a point of them.
 //!
-//! [`Emitters`] lists what a scene's lights are made of: triangles of mesh lights, spheres, points
-//! and spots, in canonical order. [`PosedEmitters`] puts them where a frame has them: it gives the
-//! bounds that a tree is built over, takes a sample of one emitter for a receiver, and tells the
-//! radiance and the sampling density of one that a ray has hit, so that both ways of finding light
-//! can be weighed against each other. [`InfiniteLight`]s, suns and domes, stay outside the tree.
+//! [`Emitters`] lists what a scene's lights are made of, in canonical order: triangles of mesh lights,
+//! spheres, points and spots. [`PosedEmitters`] puts them where a frame has them. It gives the bounds
+//! that a tree is built over, and samples one emitter for a receiver. For an emitter that a ray has hit
+//! it gives the radiance and the sampling density, so that multiple importance sampling can weigh both
+//! ways of finding light. [`InfiniteLight`]s, suns and domes, stay outside the tree.
 //!
-//! This room does not know the tree; which emitter to sample is decided elsewhere.
+//! This room does not know the tree. Which emitter to sample is decided elsewhere.
+//!
+//! Differences of positions, angles off an axis and products of edges are in double precision. What is
+//! stored and handed out is in 32 bits.
 
 mod beam;
 mod bounding;
 mod dome;
 mod infinite;
 mod mesh_light;
+mod picture;
 mod posed;
 mod set;
 mod shaping;
 mod sphere;
+mod texel_rows;
 mod texels;
+mod textured;
 mod triangle;
 
 pub use bounding::LightOverflow;
@@ -26,3 +32,4 @@ pub use mesh_light::MeshLight;
 pub use posed::{EmitterHit, LightSample, MeshPlace, PosedEmitters};
 pub use set::{EmitterPlace, EmitterRef, Emitters, LightEntry, LightSource};
 pub use sphere::WorldSphere;
+pub use textured::{KnownMeans, LitTriangle, TextureMeans};

@@ -3,9 +3,11 @@
 use super::set::{EmitterPlace, Emitters};
 use super::sphere::WorldSphere;
 use super::triangle::WorldTriangle;
+use crate::math::angle::OffAxis;
 use crate::math::color::Rgb;
+use crate::math::directions::{aim, mirrors};
 use crate::scene::{Instance, Light, LightKind, Material, Pose, Scene, Shaping};
-use glam::{Vec2, Vec3};
+use glam::{DVec3, Vec2, Vec3};
 
 /// The emitters of a scene, placed by a pose.
 #[derive(Clone, Copy)]
@@ -35,6 +37,8 @@ pub struct LightSample {
     pub pdf: Option<f32>,
     /// Where on a mesh light: its coverage there, which a material may lower, is not in `radiance`.
     pub on_mesh: Option<MeshPlace>,
+    /// Whether reflected rays meet the light.
+    pub is_seen: bool,
 }
 
 /// A place on an instance of a mesh.
@@ -68,17 +72,18 @@ impl<'a> PosedEmitters<'a> {
                 let found = triangle.sample(receiver, u)?;
                 let barycentric = found.barycentric;
                 let point = triangle.at(barycentric);
-                let direction = (point - receiver).try_normalize()?;
+                let direction = (point.as_dvec3() - receiver.as_dvec3()).try_normalize()?;
                 let radiance =
                     self.triangle_radiance(row, number, &triangle, barycentric, direction);
                 (radiance != Rgb::ZERO).then_some(LightSample {
-                    direction,
+                    direction: direction.as_vec3(),
                     point,
-                    normal: triangle.area_normal().normalize_or_zero(),
+                    normal: triangle.normal(),
                     magnitude_m: triangle.magnitude_m(),
                     radiance,
                     pdf: Some(found.pdf),
                     on_mesh: Some(MeshPlace { instance: row, triangle: number, barycentric }),
+                    is_seen: self.scene.instances[row as usize].visibility.reflections,
                 })
             }
             EmitterPlace::Light(row) => self.sample_light(row, receiver, u),
@@ -88,26 +93,22 @@ impl<'a> PosedEmitters<'a> {
     fn sample_light(&self, row: u32, receiver: Vec3, u: Vec2) -> Option<LightSample> {
         let light = &self.scene.lights[row as usize];
         let rgb = self.scene.rgb_of_light(row, self.pose);
-        let shaped = |shaping: &Option<Shaping>, direction: Vec3| {
-            shaping.map_or(Rgb::ONE, |s| s.factor((-direction).dot(self.aim(light.node))))
-        };
         let sample = match &light.kind {
-            LightKind::Point { .. } => self.sample_point(light, receiver, rgb, &None)?,
+            LightKind::Point { .. } => self.sample_point(light, receiver, rgb, None)?,
             LightKind::Spot { shaping, .. } => {
-                self.sample_point(light, receiver, rgb, &Some(*shaping))?
+                self.sample_point(light, receiver, rgb, Some(*shaping))?
             }
             LightKind::Sphere { shaping, .. } => {
-                let sphere = self.sphere(light);
-                let found = sphere.sample(receiver, u)?;
-                let point = receiver + found.direction * found.distance;
+                let found = self.sphere(light).sample(receiver, u)?;
                 LightSample {
                     direction: found.direction,
-                    point,
-                    normal: (point - sphere.center).normalize_or_zero(),
-                    magnitude_m: receiver.abs().max(point.abs()).max_element(),
-                    radiance: rgb * shaped(shaping, found.direction),
+                    point: found.point,
+                    normal: found.normal,
+                    magnitude_m: found.point.abs().max_element(),
+                    radiance: rgb * self.profile(*shaping, light.node, found.direction.as_dvec3()),
                     pdf: Some(found.pdf),
                     on_mesh: None,
+                    is_seen: light.visibility.reflections,
                 }
             }
             LightKind::Distant { .. } | LightKind::Dome { .. } => return None,
@@ -121,29 +122,32 @@ impl<'a> PosedEmitters<'a> {
         light: &Light,
         receiver: Vec3,
         intensity_cd: Rgb,
-        shaping: &Option<Shaping>,
+        shaping: Option<Shaping>,
     ) -> Option<LightSample> {
         let point = Vec3::from(self.pose.world(light.node).translation);
-        let to_light = point - receiver;
-        let d2 = to_light.length_squared();
-        let distance = d2.sqrt();
-        if d2 == 0.0 {
-            return None;
-        }
-        let direction = to_light / distance;
-        let profile =
-            shaping.map_or(Rgb::ONE, |s| s.factor((-direction).dot(self.aim(light.node))));
-        let window = light.range_m.map_or(1.0, |range| (1.0 - (distance / range).powi(4)).max(0.0));
-        let radiance = intensity_cd * profile * (window / d2);
-        Some(LightSample {
-            direction,
+        let to_light = point.as_dvec3() - receiver.as_dvec3();
+        let distance = to_light.length();
+        let direction = to_light.try_normalize()?;
+        let profile = self.profile(shaping, light.node, to_light);
+        let ratio = light.range_m.map_or(0.0, |range| distance / f64::from(range));
+        let window = (1.0 - ratio.powi(4)).max(0.0);
+        let radiance = intensity_cd * profile * (window / (distance * distance)) as f32;
+        radiance.is_finite().then_some(LightSample {
+            direction: direction.as_vec3(),
             point,
             normal: Vec3::ZERO,
             magnitude_m: 0.0,
             radiance,
             pdf: None,
             on_mesh: None,
+            is_seen: false,
         })
+    }
+
+    /// The factor of an emission profile about a node's -Z on light that a viewer sees in some
+    /// direction, of any length but zero.
+    fn profile(&self, shaping: Option<Shaping>, node: u32, direction: DVec3) -> Rgb {
+        shaping.map_or(Rgb::ONE, |s| s.factor(OffAxis::between(self.aim(node), -direction)))
     }
 
     /// Radiance that a ray sees where it has hit an emitter, nits. `direction` is the ray's, unit.
@@ -151,13 +155,13 @@ impl<'a> PosedEmitters<'a> {
         match self.emitters.place_of(hit.emitter) {
             EmitterPlace::Triangle { instance, triangle: number } => {
                 let triangle = self.triangle(&self.scene.instances[instance as usize], number);
-                self.triangle_radiance(instance, number, &triangle, hit.barycentric, direction)
+                let (at, direction) = (hit.barycentric, direction.as_dvec3());
+                self.triangle_radiance(instance, number, &triangle, at, direction)
             }
             EmitterPlace::Light(row) => match &self.scene.lights[row as usize] {
                 Light { node, kind: LightKind::Sphere { shaping, .. }, .. } => {
-                    let cosine = (-direction).dot(self.aim(*node));
                     self.scene.rgb_of_light(row, self.pose)
-                        * shaping.map_or(Rgb::ONE, |s| s.factor(cosine))
+                        * self.profile(*shaping, *node, direction.as_dvec3())
                 }
                 _ => Rgb::ZERO,
             },
@@ -187,7 +191,7 @@ impl<'a> PosedEmitters<'a> {
         number: u32,
         triangle: &WorldTriangle,
         barycentric: Vec2,
-        direction: Vec3,
+        direction: DVec3,
     ) -> Rgb {
         let instance = &self.scene.instances[row as usize];
         let material = self.material(instance);
@@ -207,10 +211,7 @@ impl<'a> PosedEmitters<'a> {
                 radiance *= texture.lookup(usage.map(uv)).truncate();
             }
         }
-        match instance.shaping {
-            Some(shaping) => radiance * shaping.factor((-direction).dot(self.aim(instance.node))),
-            None => radiance,
-        }
+        radiance * self.profile(instance.shaping, instance.node, direction)
     }
 
     pub(super) fn material(&self, instance: &Instance) -> &'a Material {
@@ -227,9 +228,9 @@ impl<'a> PosedEmitters<'a> {
         }
     }
 
-    /// -1 for an instance whose transform mirrors, whose triangles wind the other way round.
-    pub(super) fn handedness(&self, instance: &Instance) -> f32 {
-        1f32.copysign(self.pose.world(instance.node).matrix3.determinant())
+    /// -1 for an instance whose transform mirrors, and whose triangles therefore wind the other way.
+    pub(super) fn handedness(&self, instance: &Instance) -> f64 {
+        if mirrors(&self.pose.world(instance.node)) { -1.0 } else { 1.0 }
     }
 
     pub(super) fn sphere(&self, light: &Light) -> WorldSphere {
@@ -242,8 +243,8 @@ impl<'a> PosedEmitters<'a> {
         WorldSphere { center: world.translation.into(), radius }
     }
 
-    /// Where a node aims: its -Z, unit, world space.
-    pub(super) fn aim(&self, node: u32) -> Vec3 {
-        (-Vec3::from(self.pose.world(node).matrix3.z_axis)).normalize_or(-Vec3::Z)
+    /// Where a node aims its light, unit, world space.
+    pub(super) fn aim(&self, node: u32) -> DVec3 {
+        aim(&self.pose.world(node))
     }
 }

@@ -1,9 +1,10 @@
 //! Which emitters a scene has, in canonical order, and how to find one again from a hit.
 
-use super::mesh_light::{self, MeshLight};
+use super::mesh_light::{self, MeshLight, MeshLights};
+use super::textured::{KnownMeans, TextureMeans};
 use crate::math::Similarity;
 use crate::math::color::{Rgb, luminance};
-use crate::scene::{LightKind, Scene};
+use crate::scene::{Keys, LightKind, Scene};
 
 /// What the tree picks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -92,6 +93,7 @@ const BLOCK: u32 = 64;
 pub struct Emitters {
     lights: Vec<LightEntry>,
     mesh_lights: Vec<MeshLight>,
+    texture_means: Vec<TextureMeans>,
     count: u32,
     /// The first emitter of each light, close together.
     firsts: Vec<u32>,
@@ -107,7 +109,12 @@ impl Emitters {
     /// Finds all emitters of a scene, by the most that each light ever gives. Triangles without
     /// area and triangles whose texels are all black are none.
     pub fn collect(scene: &Scene) -> Emitters {
-        let (mesh_lights, of_instance) = mesh_light::find(scene);
+        Emitters::collect_knowing(scene, &KnownMeans::NONE)
+    }
+
+    /// The same where the means of some textures are known: to work these out is what takes time.
+    pub fn collect_knowing(scene: &Scene, known: &KnownMeans) -> Emitters {
+        let MeshLights { lights: mesh_lights, of_instance, means } = mesh_light::find(scene, known);
         let mut lights = mesh_entries(scene, &mesh_lights, &of_instance);
         let moving = scene.moving_nodes();
         for (i, light) in scene.lights.iter().enumerate() {
@@ -116,7 +123,7 @@ impl Emitters {
                     path: scene.light_path(i).to_owned(),
                     source: LightSource::Light(i as u32),
                     moves: moving[light.node as usize],
-                    varies: light.values.is_some(),
+                    varies: light.values.as_ref().is_some_and(Keys::varies),
                     forced: light.forced,
                     in_own_space: false,
                     first: 0,
@@ -125,7 +132,7 @@ impl Emitters {
             }
         }
         lights.sort_by(|a, b| a.class().cmp(&b.class()).then_with(|| a.path.cmp(&b.path)));
-        Emitters::number(scene, lights, mesh_lights)
+        Emitters { texture_means: means, ..Emitters::number(scene, lights, mesh_lights) }
     }
 
     /// Numbers the emitters of sorted lights.
@@ -147,7 +154,17 @@ impl Emitters {
             }
         }
         let firsts = lights.iter().map(|light| light.first).collect();
-        Emitters { lights, mesh_lights, count, firsts, blocks, light_of_instance, entry_of_light }
+        let texture_means = Vec::new();
+        Emitters {
+            lights,
+            mesh_lights,
+            texture_means,
+            count,
+            firsts,
+            blocks,
+            light_of_instance,
+            entry_of_light,
+        }
     }
 
     /// The lights, in the order of their emitters.
@@ -158,6 +175,11 @@ impl Emitters {
     /// What the mesh lights are instances of.
     pub fn mesh_lights(&self) -> &[MeshLight] {
         &self.mesh_lights
+    }
+
+    /// What textures give the triangles of the mesh lights, by ascending fingerprint, each once.
+    pub fn texture_means(&self) -> &[TextureMeans] {
+        &self.texture_means
     }
 
     /// How many emitters there are.
@@ -242,7 +264,8 @@ fn mesh_entries(
     let entry = |(i, (instance, row)): (usize, (&crate::scene::Instance, &Option<u32>))| {
         let mesh_light = (*row)?;
         let count = mesh_lights[mesh_light as usize].count;
-        let (moves, varies) = (moving[instance.node as usize], instance.values.is_some());
+        let (moves, varies) =
+            (moving[instance.node as usize], instance.values.as_ref().is_some_and(Keys::varies));
         let is_shared = users[mesh_light as usize] > 1 || moves || varies;
         Some(LightEntry {
             path: instance.path.clone(),

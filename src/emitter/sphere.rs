@@ -1,7 +1,10 @@
 //! Sampling a sphere as seen from a point outside: evenly over the cone that it fills.
+//!
+//! Distances may be 1e9 radii or a millionth of a radius: all of this is in double precision and no
+//! step subtracts nearly equal numbers but the two positions.
 
-use crate::math::{Frame, warp};
-use glam::{Vec2, Vec3};
+use crate::math::warp;
+use glam::{DVec3, Vec2, Vec3};
 
 /// A sphere in world space. It emits outwards; from inside it is dark.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -12,76 +15,123 @@ pub struct WorldSphere {
     pub radius: f32,
 }
 
-/// A direction towards a sphere.
+/// A point of a sphere, seen from somewhere.
 #[derive(Clone, Copy, Debug)]
 pub struct SphereSample {
     /// Unit, from the viewer.
     pub direction: Vec3,
-    /// To the nearer surface, metres.
-    pub distance: f32,
+    /// On the surface, world space, metres.
+    pub point: Vec3,
+    /// Unit, outwards.
+    pub normal: Vec3,
     /// Density over solid angle, 1/sr.
     pub pdf: f32,
 }
 
+/// A sphere as a viewer outside sees it.
+struct View {
+    to_center: DVec3,
+    distance: f64,
+    /// Squared length of a tangent from the viewer, m^2.
+    tangent2: f64,
+    /// `1 - cos` of the half angle that it fills.
+    cap: f64,
+}
+
 impl WorldSphere {
-    /// `1 - cos` of the half angle under which the sphere is seen; `None` from inside.
-    fn one_minus_cos_max(&self, from: Vec3) -> Option<f32> {
-        let d2 = (self.center - from).as_dvec3().length_squared();
-        let sin2 = f64::from(self.radius).powi(2) / d2;
-        // (1 - cos) = sin^2 / (1 + cos): no cancellation for far spheres.
-        (sin2 < 1.0).then(|| (sin2 / (1.0 + (1.0 - sin2).sqrt())) as f32)
+    /// `None` from inside.
+    fn view(&self, from: Vec3) -> Option<View> {
+        let to_center = self.center.as_dvec3() - from.as_dvec3();
+        let (distance, radius) = (to_center.length(), f64::from(self.radius));
+        let tangent2 = (distance - radius) * (distance + radius);
+        // 1 - cos = sin^2 / (1 + cos), which does not cancel for far spheres.
+        let cosine = tangent2.max(0.0).sqrt() / distance;
+        let cap = (radius / distance).powi(2) / (1.0 + cosine);
+        (tangent2 > 0.0).then_some(View { to_center, distance, tangent2, cap })
     }
 
     /// A direction towards the sphere; `None` from inside.
     pub fn sample(&self, from: Vec3, u: Vec2) -> Option<SphereSample> {
-        let cap = self.one_minus_cos_max(from)?;
-        let to_center = self.center - from;
-        let d = to_center.length();
-        let local = warp::cone(u, cap);
-        let direction = Frame::around(to_center / d).to_outer(local);
-        // Chord geometry; beyond the rim by rounding the ray grazes at the tangent's length.
-        let sine2 = local.truncate().length_squared();
-        let half_chord = (self.radius * self.radius - d * d * sine2).max(0.0).sqrt();
-        let distance = d * local.z - half_chord;
-        let pdf = warp::cone_pdf(cap);
-        (pdf.is_finite() && distance > 0.0).then_some(SphereSample { direction, distance, pdf })
+        let View { to_center, distance, tangent2, cap } = self.view(from)?;
+        let u = u.as_dvec2();
+        let below = u.x * cap;
+        let (cosine, sine) = (1.0 - below, (below * (2.0 - below)).sqrt());
+        let (sin_phi, cos_phi) = (std::f64::consts::TAU * u.y).sin_cos();
+        let axis = to_center / distance;
+        let (tangent, bitangent) = axis.any_orthonormal_pair();
+        let direction = axis * cosine + (tangent * cos_phi + bitangent * sin_phi) * sine;
+        // sin^2 of the rim less sin^2 of the direction, as a product.
+        let half_chord = distance * (cap * (1.0 - u.x) * (2.0 - cap - below)).sqrt();
+        let near = tangent2 / (distance * cosine + half_chord);
+        let normal = (direction * near - to_center).try_normalize()?;
+        let point = self.center.as_dvec3() + normal * f64::from(self.radius);
+        let pdf = warp::cone_pdf(cap as f32);
+        (pdf.is_finite() && near > 0.0).then_some(SphereSample {
+            direction: direction.as_vec3(),
+            point: point.as_vec3(),
+            normal: normal.as_vec3(),
+            pdf,
+        })
     }
 
-    /// The density over solid angle of any direction that hits the sphere; 0 from inside.
+    /// The density over solid angle of any direction that hits the sphere; 0 from inside, and 0 where
+    /// [`sample`](Self::sample) gives none.
     pub fn pdf(&self, from: Vec3) -> f32 {
-        self.one_minus_cos_max(from).map_or(0.0, warp::cone_pdf)
+        let pdf = self.view(from).map_or(0.0, |view| warp::cone_pdf(view.cap as f32));
+        if pdf.is_finite() { pdf } else { 0.0 }
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::f32::consts::PI;
+    use proptest::prelude::*;
+    use std::f64::consts::{PI, TAU};
 
-    #[test]
-    fn irradiance_is_that_of_a_sphere() {
-        for (distance, radius) in [(2.0f32, 1.0f32), (1.01, 1.0), (100.0, 0.1), (1e4, 1e-3)] {
-            let sphere = WorldSphere { center: Vec3::Z * distance, radius };
-            let n = 64;
+    proptest! {
+        /// From a millionth of a radius above the surface to 1e9 radii away, at any scale.
+        #[test]
+        fn it_gives_the_irradiance_of_a_sphere_from_near_and_far(
+            above in -6.0..9.0, scale in -9.0..9.0, turn in prop::array::uniform3(-1f32..1.0)
+        ) {
+            prop_assume!(Vec3::from(turn).length() > 0.1);
+            let radius = 10f64.powf(scale) as f32;
+            let away = f64::from(radius) * (1.0 + 10f64.powf(above));
+            let from = Vec3::from(turn).normalize() * away as f32;
+            let sphere = WorldSphere { center: Vec3::ZERO, radius };
+            // Where the viewer is after rounding.
+            let (from64, r) = (from.as_dvec3(), f64::from(radius));
+            let d = from64.length();
+            prop_assume!(d > r);
+            let n = 48;
             let cell = |i: usize| (i as f32 + 0.5) / n as f32;
-            let estimate = |i: usize| {
-                let s = sphere.sample(Vec3::ZERO, Vec2::new(cell(i % n), cell(i / n))).unwrap();
-                let hit = s.direction * s.distance;
-                let off = ((hit - sphere.center).length() - radius).abs();
-                assert!(off <= 1e-3 * radius + 1e-6 * distance, "{off}");
-                s.direction.z / s.pdf
-            };
-            let mean = (0..n * n).map(estimate).sum::<f32>() / (n * n) as f32;
-            let exact = PI * (radius / distance).powi(2);
-            assert!((mean / exact - 1.0).abs() < 1e-3, "{mean} {exact}");
-            assert_eq!(sphere.pdf(Vec3::ZERO), sphere.sample(Vec3::ZERO, Vec2::ZERO).unwrap().pdf);
+            let mut irradiance = 0.0;
+            for i in 0..n * n {
+                let s = sphere.sample(from, Vec2::new(cell(i % n), cell(i / n))).unwrap();
+                let off = (s.point.as_dvec3().length() / r - 1.0).abs();
+                prop_assert!(off < 3e-7, "{off} off the surface");
+                // Seen from outside, up to the rounding of a direction.
+                prop_assert!(s.normal.dot(s.direction) < 1e-6);
+                irradiance += -from64.dot(s.direction.as_dvec3()) / d / f64::from(s.pdf);
+                prop_assert_eq!(s.pdf, sphere.pdf(from));
+            }
+            let mean = irradiance / (n * n) as f64;
+            let exact = PI * (r / d).powi(2);
+            prop_assert!((mean / exact - 1.0).abs() < 1e-5, "{mean} {exact}");
+            // 1 - cos without cancellation: of half the angle, by its tangent.
+            let angle = r.atan2(((d - r) * (d + r)).sqrt());
+            let solid_angle = 2.0 * TAU * (0.5 * angle).sin().powi(2);
+            let pdf = f64::from(sphere.pdf(from));
+            prop_assert!((pdf * solid_angle - 1.0).abs() < 1e-5, "{pdf} {solid_angle}");
         }
     }
 
     #[test]
     fn from_inside_it_is_dark() {
         let sphere = WorldSphere { center: Vec3::ZERO, radius: 1.0 };
-        assert!(sphere.sample(Vec3::X * 0.5, Vec2::splat(0.5)).is_none());
-        assert_eq!(sphere.pdf(Vec3::X * 0.5), 0.0);
+        for inside in [Vec3::X * 0.5, Vec3::X, Vec3::ZERO, Vec3::Y * 0.999_999_94] {
+            assert!(sphere.sample(inside, Vec2::splat(0.5)).is_none());
+            assert_eq!(sphere.pdf(inside), 0.0);
+        }
     }
 }

@@ -1,16 +1,21 @@
 //! Sampling a triangle as seen from a point.
 //!
-//! Triangles that fill a good part of the view are sampled by solid angle (Arvo 1995, "Stratified
-//! Sampling of Spherical Triangles"), which removes the noise of a near area light; small ones by
-//! area, which is cheaper and there just as good. The choice depends on the point and the triangle
-//! alone, so the density can be told for a direction that was found another way.
+//! A triangle that spans a good part of the view is sampled by solid angle (Arvo 1995, "Stratified
+//! Sampling of Spherical Triangles"), which removes the noise of a near area light. A small one is
+//! sampled by area, which is cheaper and just as good there. The choice depends on the point and the
+//! triangle alone, so the density of a direction that was found another way is known too.
+//!
+//! Products of edges are taken in double precision: those of a sliver cancel in 32 bits, and those of
+//! a triangle of 1e-12 m vanish.
 
 use crate::math::warp;
 use glam::{DVec3, Vec2, Vec3};
 
-/// Solid angles in steradians between which directions are sampled by solid angle. Below, the
-/// spherical construction cancels; a point in the triangle's plane is above.
-const SPHERICAL_SR: std::ops::Range<f64> = 1e-3..6.2;
+/// Triangles whose edges all are below this share of the distance to a corner, squared, are small.
+const SMALL2: f64 = 5e-4;
+/// Solid angles in steradians that are sampled by solid angle where the triangle is not small. Needles
+/// are below, and would cancel; above is a point in the triangle's plane.
+const SPHERICAL_SR: std::ops::Range<f64> = 1e-5..6.283_185_2;
 
 /// A triangle in world space.
 #[derive(Clone, Copy, Debug)]
@@ -29,15 +34,20 @@ pub struct TriangleSample {
 }
 
 impl WorldTriangle {
-    /// Normal with twice the triangle's area as its length.
-    pub fn area_normal(&self) -> Vec3 {
-        let [a, b, c] = self.corners;
+    /// Normal with twice the triangle's area as its length, m^2.
+    pub fn area_normal(&self) -> DVec3 {
+        let [a, b, c] = self.corners.map(|corner| corner.as_dvec3());
         (b - a).cross(c - a)
+    }
+
+    /// Unit normal; zero if the triangle has no area.
+    pub fn normal(&self) -> Vec3 {
+        self.area_normal().normalize_or_zero().as_vec3()
     }
 
     /// Area, m^2.
     pub fn area(&self) -> f32 {
-        0.5 * self.area_normal().length()
+        (0.5 * self.area_normal().length()) as f32
     }
 
     /// The largest coordinate of a corner, metres.
@@ -74,7 +84,7 @@ impl WorldTriangle {
 
     /// Density over solid angle of a point taken evenly over the area: `d^2 / (cos A)`.
     fn area_pdf(&self, from: Vec3, point: Vec3) -> Option<f32> {
-        let (normal, to_point) = (self.area_normal().as_dvec3(), (point - from).as_dvec3());
+        let (normal, to_point) = (self.area_normal(), point.as_dvec3() - from.as_dvec3());
         let d2 = to_point.length_squared();
         let projected = 0.5 * normal.dot(to_point).abs();
         let pdf = (d2 * d2.sqrt() / projected) as f32;
@@ -83,7 +93,7 @@ impl WorldTriangle {
 
     /// Where a ray towards the triangle meets its plane, brought inside.
     fn barycentric_along(&self, from: Vec3, direction: DVec3) -> Option<Vec2> {
-        let [a, b, c] = self.corners.map(|corner| (corner - from).as_dvec3());
+        let [a, b, c] = self.corners.map(|corner| corner.as_dvec3() - from.as_dvec3());
         let (ab, ac) = (b - a, c - a);
         let p = direction.cross(ac);
         let determinant = ab.dot(p);
@@ -112,14 +122,14 @@ struct SphericalTriangle {
 impl SphericalTriangle {
     /// The view of a triangle, if it is one that is sampled by solid angle.
     fn of(triangle: &WorldTriangle, from: Vec3) -> Option<SphericalTriangle> {
-        let corners = triangle.corners.map(|corner| (corner - from).as_dvec3());
+        let corners = triangle.corners.map(|corner| corner.as_dvec3() - from.as_dvec3());
         // A cheap bound first: most triangles of a mesh light are far too small.
         let nearest2 = corners.iter().map(|c| c.length_squared()).fold(f64::INFINITY, f64::min);
         let longest2 = (corners[1] - corners[0])
             .length_squared()
             .max((corners[2] - corners[0]).length_squared())
             .max((corners[2] - corners[1]).length_squared());
-        if longest2 < 0.25 * nearest2 && longest2 < 0.5 * SPHERICAL_SR.start * nearest2 {
+        if longest2 < SMALL2 * nearest2 {
             return None;
         }
         let [a, b, c] = corners.map(DVec3::try_normalize);
@@ -189,12 +199,11 @@ mod tests {
     /// Irradiance from a polygon of radiance 1 on a surface that faces +Z (Lambert's formula).
     fn irradiance(triangle: &WorldTriangle) -> f64 {
         let c = triangle.corners.map(|corner| corner.as_dvec3().normalize());
-        (0..3)
-            .map(|i| (c[i], c[(i + 1) % 3]))
-            .map(|(a, b)| a.cross(b).normalize().z * a.dot(b).acos())
-            .sum::<f64>()
-            .abs()
-            / 2.0
+        let edge = |a: DVec3, b: DVec3| {
+            let across = a.cross(b);
+            across.normalize().z * across.length().atan2(a.dot(b))
+        };
+        (0..3).map(|i| edge(c[i], c[(i + 1) % 3])).sum::<f64>().abs() / 2.0
     }
 
     #[test]
@@ -204,6 +213,40 @@ mod tests {
             let cosine = |p: Vec3| f64::from(p.normalize().z);
             let (got, exact) = (integrate(&triangle, Vec3::ZERO, cosine), irradiance(&triangle));
             assert!((got / exact - 1.0).abs() < 3e-3, "{size}: {got} {exact}");
+        }
+    }
+
+    /// Slivers, overhead and aside, 1e-9 to 1 as wide as long, in scenes of 1e-9 to 1e9 metres.
+    #[test]
+    fn slivers_of_any_width_and_size_give_lamberts_irradiance() {
+        for step in 0..=18 {
+            let width = 10f32.powf(-0.5 * step as f32);
+            for scale in [1e-9f32, 1.0, 1e9] {
+                for [x, z] in [[0.0, 0.5], [0.3, 0.1], [2.0, 1.0]] {
+                    // From zero, so that no width is lost in a coordinate.
+                    let corners = [[-1.0 + x, 0.0, z], [1.0 + x, 0.0, z], [x, width, z]];
+                    let corners = corners.map(|c| Vec3::from(c) * scale);
+                    let triangle = WorldTriangle { corners };
+                    let cosine = |p: Vec3| p.as_dvec3().normalize().z;
+                    let got = integrate(&triangle, Vec3::ZERO, cosine);
+                    let exact = irradiance(&triangle);
+                    let what = format!("{width} wide at {x} {z}, times {scale}");
+                    assert!((got / exact - 1.0).abs() < 5e-3, "{what}: {got} {exact}");
+                }
+            }
+        }
+    }
+
+    /// A viewer just below a triangle sees half the sphere filled: no direction may be missed.
+    #[test]
+    fn a_touching_triangle_fills_the_sky() {
+        for step in 0..=24 {
+            let height = 10f32.powf(-0.25 * step as f32);
+            let corners = [[-1.0, -1.0, height], [2.0, -1.0, height], [-1.0, 2.0, height]];
+            let triangle = WorldTriangle { corners: corners.map(Vec3::from) };
+            let cosine = |p: Vec3| p.as_dvec3().normalize().z;
+            let (got, exact) = (integrate(&triangle, Vec3::ZERO, cosine), irradiance(&triangle));
+            assert!((got / exact - 1.0).abs() < 5e-3, "{height}: {got} {exact}");
         }
     }
 

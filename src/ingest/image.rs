@@ -2,8 +2,8 @@
 
 use super::budget::Budget;
 use super::error::Fault;
+use super::open_exr;
 use crate::scene::Pixels;
-use exr::prelude as openexr;
 use image::{ImageFormat, ImageReader, Limits};
 use std::io::Cursor;
 
@@ -45,7 +45,7 @@ pub(super) fn decode(
     budget.grow(bytes.len() as u64);
     const OPENEXR: &[u8] = b"\x76\x2f\x31\x01";
     if bytes.starts_with(OPENEXR) {
-        return decode_exr(bytes, object, budget);
+        return open_exr::decode(bytes, object, |size| reserve(size, 12, object, budget));
     }
     let damaged = |error: image::ImageError| {
         Fault::new(object, format!("cannot be decoded: {error}"))
@@ -99,39 +99,8 @@ fn reserve(
     budget.take(bytes, || object.to_string())
 }
 
-fn decode_exr(bytes: &[u8], object: &str, budget: &mut Budget) -> Result<Picture, Fault> {
-    let damaged = |error: openexr::Error| {
-        Fault::new(object, format!("cannot be decoded: {error}"))
-            .remedy("open it in an image viewer and save it again as flat RGB OpenEXR")
-    };
-    let headers =
-        openexr::MetaData::read_from_buffered(Cursor::new(bytes), false).map_err(damaged)?;
-    for header in &headers.headers {
-        let size = (header.layer_size.width(), header.layer_size.height());
-        reserve(size, 12, object, budget)?;
-    }
-    use openexr::{ReadChannels, ReadLayers};
-    let image = openexr::read()
-        .no_deep_data()
-        .largest_resolution_level()
-        .rgb_channels(
-            |size, _| (vec![[0.0f32; 3]; size.area()], size.width()),
-            |(pixels, width), at, (r, g, b): (f32, f32, f32)| {
-                pixels[at.y() * *width + at.x()] = [r, g, b].map(radiance);
-            },
-        )
-        .first_valid_layer()
-        .all_attributes()
-        .from_buffered(Cursor::new(bytes))
-        .map_err(damaged)?;
-    let size = image.layer_data.size;
-    let (pixels, _) = image.layer_data.channel_data.pixels;
-    let (width, height) = (size.width() as u32, size.height() as u32);
-    Ok(Picture { width, height, pixels: Pixels::Float(pixels) })
-}
-
 /// Light is neither negative nor infinite.
-fn radiance(value: f32) -> f32 {
+pub(super) fn radiance(value: f32) -> f32 {
     match value {
         f32::INFINITY => BRIGHTEST,
         value if value > 0.0 => value,

@@ -23,6 +23,8 @@ mod image;
 mod normals;
 mod notes;
 mod obj;
+mod open_exr;
+mod origin;
 mod paths;
 mod uri;
 
@@ -44,7 +46,11 @@ pub fn load(path: &Path) -> Result<Scene, IngestError> {
     };
     let checked = scene.and_then(|scene| extent::check(&scene).map(|()| scene));
     match checked {
-        Ok(scene) => Ok(Scene { source: path.to_path_buf(), ..scene }),
+        Ok(mut scene) => {
+            scene.source = path.to_path_buf();
+            origin::settle(&mut scene);
+            Ok(scene)
+        }
         Err(fault) => Err(fault.in_file(path)),
     }
 }

@@ -2,6 +2,7 @@
 
 use crate::bounds::Aabb;
 use crate::light_tree::{Group, InstanceRow, LightTree, Link, Node, TreeKind, TreeRow};
+use crate::pipeline::origin_of;
 use glam::Affine3A;
 
 /// A node that a walk comes by.
@@ -41,11 +42,16 @@ pub fn walk<D: AsRef<[u8]>>(tree: &LightTree<D>, visit: impl FnMut(&Stop) -> boo
     let mut walk = Walk { tree, visit, open: Vec::new(), stops: 0 };
     let first = tree.frames().first().map_or(0, |row| row.frame);
     let Ok((root, forced)) = tree.roots_at(first) else { return };
+    let world = Space {
+        to_world: Affine3A::from_translation(origin_of(tree).as_vec3()),
+        brightness: 1.0,
+        first_emitter: 0,
+    };
     if let Some(row) = root.and_then(|row| tree.trees().get(row as usize)) {
-        walk.start(row, Space::WORLD, What::Cluster, f64::from(row.root.energy()));
+        walk.start(row, world, What::Cluster, f64::from(row.root.energy()));
     }
     for &instance in forced {
-        let (row, space) = walk.placed(&Space::WORLD, &tree.instances()[instance as usize]);
+        let (row, space) = walk.placed(&world, &tree.instances()[instance as usize]);
         let light = walk.light_of(space.first_emitter);
         walk.start(row, space, What::Light(light), f64::from(tree.lights()[light].energy));
     }
@@ -66,10 +72,6 @@ struct Space {
     brightness: f64,
     /// The tree's emitters are numbered from here on.
     first_emitter: u32,
-}
-
-impl Space {
-    const WORLD: Space = Space { to_world: Affine3A::IDENTITY, brightness: 1.0, first_emitter: 0 };
 }
 
 /// A group to go on from.

@@ -2,16 +2,19 @@
 //!
 //! Lights are compared by their fingerprints, which cover all that a tree depends on. One that has
 //! the fingerprint of a light of the base is unchanged, whatever it is called now and wherever it
-//! stands among the others.
+//! stands among the others. So its leaves must be those that a build would give it now: where they are
+//! not, the base [contradicts](Base::contradicts) the scene, and nothing of it is worth having.
 
 use super::builder::{CHANGED, Earlier};
 use super::group::{Group, WIDTH};
 use super::leaves::Leaves;
-use super::node::Node;
+use super::node::{Link, Node};
 use super::records::{LightRow, TreeKind, TreeRow};
 use super::tree::LightTree;
 use super::writer::{LightList, LightSummary};
+use crate::bounds::LightBounds;
 use rayon::prelude::*;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Leaves that are looked up by one task.
 const CHUNK: usize = 1 << 12;
@@ -27,6 +30,8 @@ pub struct Base<'a> {
     in_order: bool,
     /// The first emitters of lights that are placed, and the rows of their trees; both ascending.
     placed: Vec<(u32, u32)>,
+    /// Whether a leaf was found that is not what it must be.
+    contradicts: AtomicBool,
 }
 
 impl<'a> Base<'a> {
@@ -41,41 +46,70 @@ impl<'a> Base<'a> {
         placed.dedup();
         let old_firsts = same_lights(&tree, list.lights);
         let in_order = old_firsts.iter().flatten().is_sorted();
-        Base { list, old_firsts, in_order, placed, tree }
+        let contradicts = AtomicBool::new(false);
+        Base { list, old_firsts, in_order, placed, contradicts, tree }
     }
 
-    /// The `nth` tree of its own that a light has, if the light has not changed.
-    pub(super) fn own_tree(&self, light: usize, nth: usize) -> Option<(&TreeRow, &[Group])> {
+    /// Whether some leaf of a light that has not changed is not what the light's bounds give.
+    pub fn contradicts(&self) -> bool {
+        self.contradicts.load(Ordering::Relaxed)
+    }
+
+    /// Whether a leaf is what some bounds give; notes it if not.
+    fn agrees(&self, leaf: Option<Node>, bounds: Option<&LightBounds>) -> bool {
+        let agrees = leaf.zip(bounds).is_some_and(|(leaf, bounds)| {
+            leaf.difference(&Node::encode(bounds, Link::Nothing)).is_none()
+        });
+        if !agrees {
+            self.contradicts.store(true, Ordering::Relaxed);
+        }
+        agrees
+    }
+
+    /// The `nth` tree of its own that a light has, if the light, which has these bounds, has not
+    /// changed.
+    pub(super) fn own_tree(
+        &self,
+        light: usize,
+        nth: usize,
+        bounds: &[LightBounds],
+    ) -> Option<(&TreeRow, &[Group])> {
         let old = (*self.old_firsts.get(light)?)?;
         let first = self.placed.partition_point(|&(emitter, _)| emitter < old);
         let &(emitter, row) = self.placed.get(first + nth)?;
         let tree = &self.tree.trees()[row as usize];
-        (emitter == old).then(|| (tree, self.tree.groups_of(tree)))
+        let groups = self.tree.groups_of(tree);
+        let agrees = |node: Node| match node.link() {
+            Link::Emitter(own) => self.agrees(Some(node), bounds.get(own as usize)),
+            _ => true,
+        };
+        let agree = || groups.par_iter().all(|group| group.nodes().all(agrees));
+        (emitter == old && agree()).then_some((tree, groups))
     }
 
     /// The tree of what stands still, and where in it the leaves of the new one are. `leaf` tells what
-    /// they stand for, `count` of them in the order of their emitters.
+    /// they stand for, in the order of their emitters.
     pub(super) fn still(
         &self,
-        count: usize,
+        bounds: &[LightBounds],
         leaf: impl Fn(usize) -> Leaf + Sync,
     ) -> Option<Earlier<'_>> {
         let own = 0..self.tree.first_of_class(LightRow::PLACED);
-        Some(self.earlier(self.still_row()?, own, count, leaf))
+        Some(self.earlier(self.still_row()?, own, bounds, leaf))
     }
 
     /// The same of the tree of a frame, by its place among the frames.
     pub(super) fn frame(
         &self,
         frame: usize,
-        count: usize,
+        bounds: &[LightBounds],
         leaf: impl Fn(usize) -> Leaf + Sync,
     ) -> Option<Earlier<'_>> {
         let row = self.tree.frames().get(frame)?.tree;
         let is_own = kind_of(&self.tree, row) == Some(TreeKind::Frame) && !self.is_copy(row);
         let first = |class| self.tree.first_of_class(class);
         let own = first(LightRow::CHANGES)..first(LightRow::CHANGES | LightRow::PLACED);
-        is_own.then(|| self.earlier(&self.tree.trees()[row as usize], own, count, leaf))
+        is_own.then(|| self.earlier(&self.tree.trees()[row as usize], own, bounds, leaf))
     }
 
     fn still_row(&self) -> Option<&TreeRow> {
@@ -99,7 +133,7 @@ impl<'a> Base<'a> {
         &self,
         row: &TreeRow,
         own: std::ops::Range<u32>,
-        count: usize,
+        bounds: &[LightBounds],
         leaf: impl Fn(usize) -> Leaf + Sync,
     ) -> Earlier<'_> {
         let old: Leaves = self.tree.leaves_of(row, own);
@@ -118,12 +152,18 @@ impl<'a> Base<'a> {
             }
         };
         let first = row.first_group * WIDTH as u32;
-        let mut slots = vec![CHANGED; count];
+        let node = |slot: u32| {
+            let group = self.tree.groups().get(slot as usize / WIDTH)?;
+            group.node(slot as usize % WIDTH)
+        };
+        let mut slots = vec![CHANGED; bounds.len()];
         slots.par_chunks_mut(CHUNK).enumerate().for_each(|(chunk, slots)| {
             // Leaves come in the order of their emitters.
             let mut light = self.light_before(leaf(chunk * CHUNK));
             for (i, entry) in slots.iter_mut().enumerate() {
-                let found = slot(leaf(chunk * CHUNK + i), &mut light);
+                let at = chunk * CHUNK + i;
+                let found = slot(leaf(at), &mut light);
+                let found = found.filter(|&slot| self.agrees(node(slot), bounds.get(at)));
                 *entry = found.map_or(CHANGED, |slot| slot - first);
             }
         });

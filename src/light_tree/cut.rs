@@ -1,16 +1,18 @@
-//! The cut: the clusters that a viewer samples from, found by opening the tree where it is uncertain.
+//! The cut: the clusters that a viewer samples from.
 //!
-//! A cluster that is only just opened still weighs what it weighed unopened, and only then, the more it
-//! exceeds the threshold, what its parts say: so nothing jumps where a decision changes.
+//! The cut starts as the root. A cluster whose estimate is too uncertain is *opened*: its children
+//! take its place. Opening is graded, so that noise has no seams. A cluster whose uncertainty only
+//! just exceeds the threshold is barely open: its children share the weight that it had closed. The
+//! more it exceeds the threshold, the more the children's own importances count.
 //!
-//! Which clusters these are depends on the viewer and the knob alone, so the way back from an emitter
-//! finds the same cut again. Lights beside the tree, suns and domes, stand in it like clusters that
-//! cannot be opened: they compete with the tree, and with each other, by the light that they are
-//! estimated to send.
+//! The cut depends on the viewer and the knob alone, not on a random number. So the probability of an
+//! emitter is found by making the same cut again. Infinite lights stand in the cut as clusters that
+//! cannot be opened: they compete with the tree, and with each other, by estimated contribution.
 
 use super::group::WIDTH;
 use super::leaves::{Route, lane_toward};
-use super::sampling::{FrameTree, Next, Place};
+use super::place::{Next, Place, Weighed};
+use super::sampling::FrameTree;
 use super::splitting::{Rounded, SplitTest, Splitting, allot};
 use super::viewer::Viewer;
 
@@ -33,15 +35,17 @@ impl Picked {
     }
 }
 
-/// The part in the relative variance that no opening removes: shadows, and whatever else no estimate
-/// knows of.
+/// The part of the relative variance that no opening removes: shadows, textures, whatever no estimate
+/// of the tree accounts for.
 const UNKNOWN: f64 = 0.04;
 
-/// Room for a cut and for walks below it, to be used again and again.
+/// Buffers for a cut and for walks below it, to be reused.
 #[derive(Debug)]
 pub struct Scratch<V> {
     pub(super) entries: Vec<Entry<V>>,
+    /// Of each entry: its importance.
     weights: Vec<f64>,
+    /// Of each entry: the most samples that it may get.
     caps: Vec<f64>,
     pub(super) low: Vec<f64>,
     pub(super) high: Vec<f64>,
@@ -55,6 +59,21 @@ impl<V> Default for Scratch<V> {
     }
 }
 
+impl<V> Scratch<V> {
+    fn clear(&mut self) {
+        self.entries.clear();
+        self.weights.clear();
+        self.caps.clear();
+        self.open.clear();
+    }
+
+    fn push(&mut self, entry: Entry<V>, weight: f64, cap: f64) {
+        self.entries.push(entry);
+        self.weights.push(weight);
+        self.caps.push(cap);
+    }
+}
+
 /// A cluster of the cut, or a light.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Entry<V> {
@@ -62,33 +81,33 @@ pub(super) enum Entry<V> {
     Cluster(Place<V>),
 }
 
-/// A group whose lanes are still to be looked at.
+/// An opened cluster whose children are still to be looked at.
 #[derive(Clone, Copy, Debug)]
 struct Opened<V> {
     place: Place<V>,
     /// How many legs of the wanted route lie behind; `None` off the route.
     leg: Option<usize>,
-    /// What the cluster weighed before it was opened.
+    /// Its importance while it was closed.
     weight: f64,
-    /// How far it is opened, from 0 to 1: how much of what its parts say counts.
+    /// From 0, barely open, to 1: how much the children's own importances count.
     opened: f64,
-    /// At most so many samples it had before it was opened.
+    /// The most samples it could get while it was closed.
     cap: f64,
 }
 
-/// A cut, allotted.
+/// A cut with its samples allotted.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Cut {
-    /// How many samples it is worth. Their chances, by entry, are in the scratch: `low` for the lower
-    /// whole number of samples and `high` for the one above.
+    /// How many samples the viewer gets. The chances of the entries are in the scratch: `low` if it
+    /// is the lower whole number, `high` if it is one more.
     pub rounded: Rounded,
     /// The entry that leads to the wanted emitter, and how many legs of its route lie behind.
     pub wanted: Option<(usize, usize)>,
 }
 
 impl FrameTree<'_> {
-    /// Opens the tree for a viewer and allots samples to the clusters that this leaves. `None` if
-    /// nothing can arrive. Given a route, says which of them leads along it.
+    /// Opens the tree for a viewer and allots samples to the entries of the cut. `None` if nothing
+    /// can arrive. Given a route, tells which entry leads along it.
     pub(super) fn cut<V: Viewer>(
         &self,
         viewer: &V,
@@ -97,111 +116,25 @@ impl FrameTree<'_> {
         route: Option<&Route>,
         scratch: &mut Scratch<V>,
     ) -> Option<Cut> {
-        let Scratch { entries, weights, caps, low, high, open } = scratch;
-        entries.clear();
-        weights.clear();
-        caps.clear();
-        open.clear();
-        let mut variance = 0.0;
+        scratch.clear();
         for (row, &importance) in (0..).zip(beside) {
-            entries.push(Entry::Light(Picked::Beside(row)));
-            weights.push(importance);
-            caps.push(1.0);
+            scratch.push(Entry::Light(Picked::Beside(row)), importance, 1.0);
         }
-        let mut wanted = None;
-        let root = self.total_importance(viewer);
+        let (mut variance, mut wanted) = (0.0, None);
+        let weight = self.total_importance(viewer);
         if let Some(place) = self.place_of_root(viewer)
-            && root > 0.0
+            && weight > 0.0
         {
             let leg = route.map(|_| 0);
-            // What shares are of, until more is known: the root's own estimate.
-            let mut total = root + beside.iter().sum::<f64>();
-            let mut may_open = !how.is_off();
-            if may_open {
-                open.push(Opened { place, leg, weight: root, opened: 1.0, cap: 1.0 });
+            if how.is_off() {
+                wanted = leg.map(|leg| (scratch.entries.len(), leg));
+                scratch.push(Entry::Cluster(place), weight, 1.0);
             } else {
-                entries.push(Entry::Cluster(place));
-                weights.push(root);
-                caps.push(1.0);
-                wanted = leg.map(|leg| (entries.len() - 1, leg));
-            }
-            let mut is_first = true;
-            while let Some(Opened { place, leg, weight, opened, cap }) = open.pop() {
-                let Some(group) = self.group(&place) else { continue };
-                let (mut importances, spreads) = group.weigh(&place.viewer);
-                let sum: f64 = importances.iter().sum();
-                if !(sum > 0.0 && sum.is_finite()) {
-                    continue;
-                }
-                if is_first {
-                    total = sum + beside.iter().sum::<f64>();
-                    is_first = false;
-                }
-                let weighed = importances;
-                if opened < 1.0 {
-                    let scale = opened + (1.0 - opened) * weight / sum;
-                    importances.iter_mut().for_each(|importance| *importance *= scale);
-                }
-                let threshold = how.threshold() * total;
-                let on_route = leg.and_then(|leg| {
-                    let target = route?.slots[leg] / WIDTH as u32;
-                    match target.checked_sub(place.at)? {
-                        0 => Some((route?.slots[leg] as usize % WIDTH, leg + 1)),
-                        distance => Some((lane_toward(group, distance)?, leg)),
-                    }
-                });
-                for lane in 0..WIDTH {
-                    let importance = importances[lane];
-                    if importance <= 0.0 {
-                        continue;
-                    }
-                    // Barely opened, all parts together still have no more than what they are part of.
-                    let cap = opened + (1.0 - opened) * cap * weighed[lane] / sum;
-                    let leg = on_route.filter(|&(own, _)| own == lane).map(|(_, leg)| leg);
-                    let (entry, part) = match self.follow(&place, group.link(lane)) {
-                        None => continue,
-                        Some(Next::Emitter(emitter)) => {
-                            (Entry::Light(Picked::Emitter(emitter)), 0.0)
-                        }
-                        Some(Next::Group(below)) => {
-                            let part = importance * f64::from(spreads[lane]);
-                            let excess = match how.test {
-                                _ if how.is_full() => 1.0,
-                                SplitTest::Variance => part / threshold - 1.0,
-                                SplitTest::SolidAngle => {
-                                    let glare = place.viewer.glare(&group.cluster(lane));
-                                    f64::from(u8::from(glare > how.threshold()))
-                                }
-                            };
-                            if may_open && excess > 0.0 {
-                                let further = opened * excess.min(1.0);
-                                variance += (opened - further) * part;
-                                let weight = importance;
-                                open.push(Opened {
-                                    place: below,
-                                    leg,
-                                    weight,
-                                    opened: further,
-                                    cap,
-                                });
-                                continue;
-                            }
-                            (Entry::Cluster(below), opened * part)
-                        }
-                    };
-                    if let Some(leg) = leg {
-                        wanted = Some((entries.len(), leg));
-                    }
-                    entries.push(entry);
-                    weights.push(importance);
-                    caps.push(cap);
-                    variance += part;
-                }
-                // The seed's rule samples all of the cut: then its size is what is capped.
-                may_open &= how.test == SplitTest::Variance
-                    || entries.len() + WIDTH * (open.len() + 1) <= how.most as usize;
+                scratch.open.push(Opened { place, leg, weight, opened: 1.0, cap: 1.0 });
+                (variance, wanted) = self.open_clusters(beside, how, route, scratch);
             }
         }
+        let Scratch { weights, caps, low, high, .. } = scratch;
         let total: f64 = weights.iter().sum();
         if !(total > 0.0 && total.is_finite()) {
             return None;
@@ -214,25 +147,96 @@ impl FrameTree<'_> {
         }
         Some(Cut { rounded, wanted })
     }
+
+    /// Works off the opened clusters: opens further, or adds entries. Returns the variance that the
+    /// entries leave, in the unit of importances, and the entry that leads along the route.
+    fn open_clusters<V: Viewer>(
+        &self,
+        beside: &[f64],
+        how: &Splitting,
+        route: Option<&Route>,
+        scratch: &mut Scratch<V>,
+    ) -> (f64, Option<(usize, usize)>) {
+        let (mut variance, mut wanted) = (0.0, None);
+        let mut may_open = true;
+        // The sum of everything's importance; the root's children know it better than the root.
+        let mut total = None;
+        while let Some(Opened { place, leg, weight, opened, cap }) = scratch.open.pop() {
+            let Some(Weighed { group, importances, spreads }) = self.weigh(&place) else {
+                continue;
+            };
+            let sum: f64 = importances.iter().sum();
+            if !(sum > 0.0 && sum.is_finite()) {
+                continue;
+            }
+            let total = *total.get_or_insert_with(|| sum + beside.iter().sum::<f64>());
+            let scale = if opened < 1.0 { opened + (1.0 - opened) * weight / sum } else { 1.0 };
+            let on_route = leg.and_then(|leg| {
+                let slot = route?.slots[leg];
+                match (slot / WIDTH as u32).checked_sub(place.at)? {
+                    0 => Some((slot as usize % WIDTH, leg + 1)),
+                    distance => Some((lane_toward(group, distance)?, leg)),
+                }
+            });
+            for lane in (0..WIDTH).filter(|&lane| importances[lane] > 0.0) {
+                let weight = importances[lane] * scale;
+                // Barely open, the children together get no more samples than their parent could.
+                let cap = opened + (1.0 - opened) * cap * importances[lane] / sum;
+                let leg = on_route.filter(|&(own, _)| own == lane).map(|(_, leg)| leg);
+                let entry = match self.follow(&place, group, lane) {
+                    None => continue,
+                    Some(Next::Emitter(emitter)) => Entry::Light(Picked::Emitter(emitter)),
+                    Some(Next::Group(below)) => {
+                        let part = weight * f64::from(spreads[lane]);
+                        let excess = match how.test {
+                            _ if how.is_full() => 1.0,
+                            SplitTest::Variance => part / (how.threshold() * total) - 1.0,
+                            SplitTest::SolidAngle => {
+                                let glare = place.viewer.glare(&group.cluster(lane));
+                                f64::from(u8::from(glare > how.threshold()))
+                            }
+                        };
+                        if may_open && excess > 0.0 {
+                            let further = opened * excess.min(1.0);
+                            variance += (opened - further) * part;
+                            let opened = further;
+                            scratch.open.push(Opened { place: below, leg, weight, opened, cap });
+                            continue;
+                        }
+                        variance += opened * part;
+                        Entry::Cluster(below)
+                    }
+                };
+                if let Some(leg) = leg {
+                    wanted = Some((scratch.entries.len(), leg));
+                }
+                scratch.push(entry, weight, cap);
+            }
+            // The seed's rule samples all of the cut: there its size is what is capped.
+            may_open &= how.test == SplitTest::Variance
+                || scratch.entries.len() + WIDTH * (scratch.open.len() + 1) <= how.most as usize;
+        }
+        (variance, wanted)
+    }
 }
 
 impl Cut {
-    /// The chances of all entries if so many samples are drawn.
+    /// The chances of all entries in a draw of `low` samples, or of one more.
     pub fn chances<'s, V>(&self, scratch: &'s Scratch<V>, more: bool) -> &'s [f64] {
         if more { &scratch.high } else { &scratch.low }
     }
 
-    /// What a sample of an entry is divided by, if the entry had some chance in the draw. That chance,
-    /// unless it would have been a much better one with one sample more: then its mean over both
-    /// draws, so that no sample weighs more than twice what it does in the mean. Either keeps the
-    /// mean; the first adds no noise of its own, the second no outliers.
+    /// What a sample of an entry is divided by, given the entry's chance in the draw. Normally that
+    /// chance: it adds no noise of its own. Where one sample more would at least double the chance,
+    /// it is the mean of both draws instead: no sample then weighs more than twice its mean weight.
+    /// Either way the estimate keeps its mean.
     pub fn divisor<V>(&self, scratch: &Scratch<V>, entry: usize, chance: f64) -> f64 {
         let is_even =
             self.rounded.chance_of_more <= 0.0 || 2.0 * scratch.low[entry] >= scratch.high[entry];
         if is_even { chance } else { self.expected(scratch, entry) }
     }
 
-    /// The chance of an entry to be sampled, whatever is drawn.
+    /// The chance of an entry over both draws.
     pub fn expected<V>(&self, scratch: &Scratch<V>, entry: usize) -> f64 {
         let more = self.rounded.chance_of_more;
         let high = if more > 0.0 { more * scratch.high[entry] } else { 0.0 };

@@ -1,13 +1,14 @@
-//! A point of a surface that reflects more than diffusely.
+//! A point of a surface with a diffuse and a glossy lobe.
 //!
-//! HPG 2018 leaves the BSDF out of the importance, and with it what matters most on a wet street: a
-//! small light that a surface mirrors outshines all others there, and if it is picked as seldom as its
-//! irradiance says, the picture has outliers. Here importance takes, instead of the cosine, the sum of
-//! a diffuse and a GGX lobe at the half vector towards a cluster. For a point light that is what the
-//! surface reflects. Of a cluster, the lobe's peak anywhere in its cone of directions is known, and
-//! that it cannot give more than all of itself: over the cone's solid angle `omega` a lobe `L` has at
-//! most the mean `L / (1 + L omega)`. A lobe narrower than the cone makes that uncertain, which the
-//! cluster's spread says, so that [the cut](super::cut) opens the tree towards the reflection.
+//! HPG 2018 leaves the BSDF out of the importance. On a wet street that omits what matters most: a
+//! small light that the surface mirrors outshines all others, and if it is picked only as often as its
+//! irradiance says, the picture has fireflies. So here the receiver's cosine is replaced by the sum of
+//! a diffuse lobe and a GGX lobe at the half vector. For a point light this is exactly what the surface
+//! reflects. For a cluster it is the lobe's peak within the cone of directions to the cluster, bounded
+//! because a lobe reflects at most all light: over the cone's solid angle `omega`, a lobe with the peak
+//! `L` has at most the mean `L / (1 + L omega)`. A lobe that is narrower than the cone leaves it unknown
+//! whether the light lies in it. That is added to the cluster's spread, so that
+//! [the cut](super::cut) opens the tree towards the reflection.
 
 use super::importance::{Cluster, Factors, Sight, factors};
 use super::viewer::{Receiver, Viewer};
@@ -15,34 +16,34 @@ use crate::math::Similarity;
 use glam::Vec3;
 use std::f32::consts::{FRAC_1_PI, PI, TAU};
 
-/// A receiver that knows how its surface reflects.
+/// A receiver together with the lobes of its surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Glossy {
     /// Where it is; with a normal.
     pub receiver: Receiver,
-    /// Where the light is reflected to: unit, world space, on the normal's side.
+    /// Direction towards the eye: unit, world space, on the normal's side.
     pub to_eye: Vec3,
-    /// How much of it.
+    /// What the surface reflects that way.
     pub lobes: Lobes,
-    /// A direction drawn from the BSDF, unit, world space: step 1 of the seed's "Split heuristic",
-    /// whose test alone asks for it.
+    /// A direction drawn from the BSDF, unit, world space. Only the seed's "Split heuristic" (step 1)
+    /// asks for it.
     pub toward: Vec3,
 }
 
-/// What a surface reflects towards the eye, as luminances.
+/// The lobes of a surface, as luminances.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Lobes {
     /// Albedo of the diffuse lobe, `[0, 1]`.
     pub diffuse: f32,
-    /// Reflectance of the microfacets where light meets them at their normal, `[0, 1]`.
+    /// Reflectance of the microfacets at normal incidence, `[0, 1]`.
     pub at_normal: f32,
-    /// What comes to it at grazing incidence (Schlick).
+    /// What Schlick's approximation adds to it at grazing incidence.
     pub toward_grazing: f32,
     /// GGX alpha, above zero.
     pub alpha: f32,
 }
 
-/// A surface is not taken to reflect less than this towards any light above its horizon.
+/// The least that a surface is taken to reflect of any light above its horizon.
 const LEAST: f32 = 1e-6;
 
 impl Viewer for Glossy {
@@ -69,8 +70,8 @@ impl Viewer for Glossy {
 }
 
 impl Glossy {
-    /// How much of the light from a small disk of directions is reflected, against all of it from the
-    /// zenith of a white Lambertian surface: what an importance takes for the cosine.
+    /// How much of the light from a small disk of directions is reflected, relative to a white
+    /// Lambertian surface lit from its zenith. It takes the place of the cosine in an importance.
     pub fn reflects_from(&self, direction: Vec3, half_angle_rad: f32) -> f32 {
         let (sin_u, cos_u) = half_angle_rad.min(0.5 * PI).sin_cos();
         let theta = self.receiver.normal.angle_between(direction);
@@ -78,7 +79,7 @@ impl Glossy {
         self.reflected(&Sight { to: direction.to_array(), cosine, cos_u, sin_u }).0
     }
 
-    /// The same for light from everywhere.
+    /// The same for light from all directions.
     pub fn albedo(&self) -> f32 {
         let Lobes { diffuse, at_normal, toward_grazing, .. } = self.lobes;
         let cos_o = self.receiver.normal.dot(self.to_eye).clamp(0.0, 1.0);
@@ -93,8 +94,8 @@ impl Glossy {
         let [tx, ty, tz] = sight.to;
         let one_minus_cos_u = sight.one_minus_cos_u();
 
-        // The half vector towards the centre, not yet of unit length. Directions of the cone are a
-        // chord away from its axis, at most, and move it by no more.
+        // The half vector for the centre, not yet of unit length. A direction of the cone is at most a
+        // chord away from the cone's axis, and moves the half vector by no more.
         let (hx, hy, hz) = (tx + ex, ty + ey, tz + ez);
         let length2 = (hx * hx + hy * hy + hz * hz).max(f32::MIN_POSITIVE);
         let inverse = 1.0 / length2.sqrt();

@@ -22,15 +22,17 @@ use glam::Vec3;
 /// A box this share of its distance above the horizon is not yet called below it: many times the
 /// rounding of the sums.
 const HORIZON_SLACK: f32 = 1e-5;
-/// A cosine this much beyond the cone's edge is not yet called dark. Sines taken from cosines near 1
-/// are off by up to 3.5e-4; the worst that a search along the edge found is 7.4e-4.
-const EDGE_SLACK: f32 = 2e-3;
+/// An angle this much beyond the cone's edge is not yet called dark, radians. The cosine of `theta_u` is
+/// off by up to 3.5e-4 just outside the sphere, and the angle with it.
+const EDGE_SLACK: f32 = 1e-3;
 /// The least value of a cosine factor that is not provably zero.
 const FLOOR: f32 = 1e-4;
 /// The share of the sphere's squared radius that softens the squared distance.
 pub(super) const SOFTENING: f32 = 0.1;
 /// Squares of distances and ranges are exact to so many parts.
 const RANGE_SLACK: f32 = 1e-5;
+/// So are differences of coordinates, of which a distance to a face of the box is what is left.
+const FACE_SLACK: f32 = 4.0 * f32::EPSILON;
 
 /// What the formula needs of a cluster, decoded. Components apart, as lanes have them.
 #[derive(Clone, Copy, Debug)]
@@ -56,9 +58,12 @@ pub struct View {
 impl View {
     /// Of the sphere, sr; a hemisphere from inside.
     pub fn solid_angle(&self) -> f64 {
-        let (r2, d2) = (self.radius * self.radius, self.distance * self.distance);
-        let cos_u = if r2 > 0.0 { (1.0 - r2 / d2.max(r2)).sqrt() } else { 1.0 };
-        std::f64::consts::TAU * (1.0 - cos_u)
+        if self.radius <= 0.0 {
+            return 0.0;
+        }
+        // 1 - cos = sin^2 / (1 + cos), which does not cancel for a small sphere far away.
+        let sin2_u = (self.radius / self.distance.max(self.radius)).powi(2);
+        std::f64::consts::TAU * sin2_u / (1.0 + (1.0 - sin2_u).sqrt())
     }
 }
 
@@ -70,12 +75,16 @@ impl Cluster {
         View { radius: half.length(), distance: (center - p.as_dvec3()).length() }
     }
 
-    /// How much of its light leaves at some cosine off its axis, seen under the half angle `theta_u`:
-    /// 1 inside the cone, falling to its edge, 0 only surely beyond; and the cosine of `theta_o`.
+    /// How much of its light leaves at some angle off its axis, given by cosine and sine (a cosine
+    /// alone knows nothing of small angles), seen under the half angle `theta_u`: 1 inside the cone,
+    /// falling to its edge, 0 only surely beyond. Also the cosine of `theta_o`.
     #[inline(always)]
-    pub fn emission(&self, along: f32, inside: bool, sin_u: f32, cos_u: f32) -> (f32, f32) {
-        let cosine = along.clamp(-1.0, 1.0);
-        let sine = (1.0 - cosine * cosine).sqrt();
+    pub fn emission(
+        &self,
+        (cosine, sine): (f32, f32),
+        inside: bool,
+        (sin_u, cos_u): (f32, f32),
+    ) -> (f32, f32) {
         let sin_half = self.sin_half_theta_o;
         let cos_o = 1.0 - 2.0 * sin_half * sin_half;
         let sin_o = 2.0 * sin_half * (1.0 - sin_half * sin_half).max(0.0).sqrt();
@@ -84,7 +93,11 @@ impl Cluster {
         let cos_sum = cos_o * cos_u - sin_o * sin_u;
         let within = inside | (sin_sum < 0.0) | (cosine >= cos_sum);
         let off = cosine * cos_sum + sine * sin_sum;
-        let is_dark = !within & (off < self.cos_theta_e - EDGE_SLACK);
+        // At most the cosine of theta_e and the slack together.
+        let cos_e = self.cos_theta_e;
+        let sin_e = ((1.0 - cos_e) * (1.0 + cos_e)).max(0.0).sqrt();
+        let edge = cos_e - EDGE_SLACK * (sin_e + EDGE_SLACK);
+        let is_dark = !within & (off < edge);
         let emission = if within { 1.0 } else { off.max(FLOOR) };
         (if is_dark { 0.0 } else { emission }, cos_o)
     }
@@ -169,14 +182,16 @@ pub(super) fn factors(cluster: &Cluster, receiver: &Receiver) -> Factors {
 
     // The half angle of the sphere; inside it every direction is possible.
     let inside = d2 <= r2;
-    let inverse_d = 1.0 / if inside { 1.0 } else { d };
+    let inverse_d = if d > 0.0 { 1.0 / d } else { 0.0 };
     let sin_u = if inside { 1.0 } else { r2.sqrt() * inverse_d };
     let cos_u = if inside { 0.0 } else { (d2 - r2).sqrt() * inverse_d };
 
-    let inverse_axis = 1.0 / (ax * ax + ay * ay + az * az).sqrt();
-    let along = (ax * vx + ay * vy + az * vz) * inverse_d * inverse_axis;
+    let inverse = inverse_d / (ax * ax + ay * ay + az * az).sqrt();
+    let along = (ax * vx + ay * vy + az * vz) * inverse;
     let along = if cluster.two_sided { along.abs() } else { along };
-    let (emission, cos_o) = cluster.emission(along, inside, sin_u, cos_u);
+    let (wx, wy, wz) = (ay * vz - az * vy, az * vx - ax * vz, ax * vy - ay * vx);
+    let across = (wx * wx + wy * wy + wz * wz).sqrt() * inverse;
+    let (emission, cos_o) = cluster.emission((along, across), inside, (sin_u, cos_u));
     let is_dark = emission == 0.0;
 
     // Reception: the largest cosine that any point of the sphere can have. Without a normal every
@@ -189,8 +204,8 @@ pub(super) fn factors(cluster: &Cluster, receiver: &Receiver) -> Factors {
     let to = [-vx * inverse_d, -vy * inverse_d, -vz * inverse_d];
 
     // Range: at the point of the box that is nearest.
-    let [ox, oy, oz] =
-        [(vx.abs() - hx).max(0.0), (vy.abs() - hy).max(0.0), (vz.abs() - hz).max(0.0)];
+    let beyond = |v: f32, half: f32| (v.abs() * (1.0 - FACE_SLACK) - half).max(0.0);
+    let [ox, oy, oz] = [beyond(vx, hx), beyond(vy, hy), beyond(vz, hz)];
     let window = cluster.window(ox * ox + oy * oy + oz * oz);
 
     let product = emission * window;

@@ -17,6 +17,7 @@
 //! | `builder` | the partition (SAOH) and the bounds, deterministic and parallel |
 //! | `writer`, `records`, `tree` | the trees of a shot as a file, and that file opened |
 //! | `base` | what of an earlier version of the file has stayed the same |
+//! | `place` | where a walk stands, in which space; the one function that weighs a group |
 //! | `sampling` | picking an emitter |
 //! | `splitting`, `cut` | how many samples a viewer is worth; the clusters they are taken from |
 //! | `picks` | picking those, and how often each light is expected to be |
@@ -33,6 +34,7 @@ mod importance;
 mod leaves;
 mod node;
 mod picks;
+mod place;
 mod probability;
 mod records;
 mod sampling;
@@ -52,7 +54,9 @@ pub use glossy::{Glossy, Lobes};
 pub use group::{Group, WIDTH};
 pub use leaves::LeafTable;
 pub use node::{Link, Node};
-pub use records::{FrameRow, InstanceRow, LightLook, LightRow, TreeKind, TreeRow};
+pub use records::{
+    FrameRow, InstanceRow, LightLook, LightRow, MeanRow, TextureRow, TreeKind, TreeRow,
+};
 pub use sampling::{FrameTree, Pick};
 pub use segment::Segment;
 pub use splitting::{SplitTest, Splitting};

@@ -224,6 +224,28 @@ impl Node {
     }
 }
 
+impl Node {
+    /// The first part in which another node differs, bit by bit and whatever both lead to, in words;
+    /// `None` if they bound the same.
+    pub fn difference(&self, other: &Node) -> Option<&'static str> {
+        let [own, other] = [self, other];
+        let box_of =
+            |node: &Node| (node.center.map(f32::to_bits), node.half_extent, node.half_exponent);
+        let cone_of = |node: &Node| (node.axis, node.theta_o, node.theta_e);
+        if box_of(own) != box_of(other) {
+            Some("its box")
+        } else if cone_of(own) != cone_of(other) {
+            Some("its cone")
+        } else if own.energy.to_bits() != other.energy.to_bits() {
+            Some("its energy")
+        } else if own.range != other.range {
+            Some("its range")
+        } else {
+            None
+        }
+    }
+}
+
 /// Sine of half an angle in `[0, pi]`, a hair smaller than exact: see [`ANGLE_FORGIVEN`].
 fn sin_half(angle_rad: f32) -> f64 {
     let angle = f64::from(angle_rad).min(std::f64::consts::PI) * ANGLE_FORGIVEN;

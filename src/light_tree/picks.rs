@@ -1,4 +1,4 @@
-//! Picking as many lights for a viewer as it is worth.
+//! Picking several lights for a viewer: the samples that its cut allots.
 
 use super::cut::{Cut, Entry, Picked, Scratch};
 use super::sampling::{FrameTree, Pick};
@@ -7,11 +7,12 @@ use super::viewer::Viewer;
 use crate::math::random::hash;
 
 impl FrameTree<'_> {
-    /// Calls `visit` with as many lights as the viewer is worth, each at most once, at most
-    /// [`most`](Splitting::most) in all: emitters of the tree, and lights beside it, given by their
-    /// importances. `u` is a random number in `[0, 1)`; `salt` makes each cluster draw another
-    /// number from it, and should be another for every place (but not for every sample of one place,
-    /// whose numbers then stay stratified in each cluster).
+    /// Calls `visit` with the picks for a viewer: emitters of the tree, and lights beside it, given by
+    /// their importances. None is picked twice, and there are at most [`most`](Splitting::most).
+    ///
+    /// `u` is a random number in `[0, 1)`. Each cluster shifts it by a hash of `salt`. Use one salt for
+    /// all samples of a place, so that they stay stratified within each cluster, and another salt for
+    /// another place.
     pub fn for_each_pick<V: Viewer>(
         &self,
         viewer: &V,
@@ -34,7 +35,7 @@ impl FrameTree<'_> {
         }
     }
 
-    /// One light of a cluster of the cut that has been taken with some chance.
+    /// Picks a light of an entry that has been taken with some chance.
     fn pick_in<V: Viewer>(
         &self,
         cut: &Cut,
@@ -58,9 +59,9 @@ impl FrameTree<'_> {
         }
     }
 
-    /// The expected number of samples of a light, for a viewer, among those of
-    /// [`for_each_pick`](Self::for_each_pick). An emitter whose light is forced is not among them: for
-    /// it, this is the probability in its light.
+    /// The expected number of samples that [`for_each_pick`](Self::for_each_pick) takes of a light. A
+    /// forced light is not among its picks: for an emitter of one, this is the probability of the
+    /// emitter within its light.
     pub fn expected<V: Viewer>(
         &self,
         viewer: &V,
@@ -101,8 +102,8 @@ impl FrameTree<'_> {
     }
 }
 
-/// A number of its own for a cluster: all numbers turned around the unit interval by an amount that
-/// depends on the place alone, so that an even set of numbers stays even.
+/// Shifts a number for one cluster, modulo 1 (a Cranley-Patterson rotation). The shift depends on the
+/// place alone, so that stratified numbers stay stratified.
 #[inline]
 fn another(u: f64, salt: u32, entry: u32) -> f64 {
     let turned = u + f64::from(hash(salt, entry)) / 4_294_967_296.0;

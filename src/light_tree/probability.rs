@@ -1,14 +1,15 @@
-//! The way back: how probable it is that a viewer picks an emitter.
+//! The probability with which a viewer picks a given emitter.
 //!
-//! When a reflected ray hits an emitter, its weight asks how often the emitter would have been picked
-//! from the point before. The walk from the root to the emitter's leaf is known, because groups
-//! stand in preorder: there is no bit trail to store, and no depth at which it ends. Along it every
-//! decision is weighed by the code that picks, so both agree to the last bits.
+//! Multiple importance sampling asks for it when a reflected ray hits an emitter. The walk from the
+//! root to the emitter's leaf is known, because groups stand in preorder: the next child is the last
+//! one that begins at or before the leaf. No bit trail is stored, and depth has no limit. Every
+//! decision on the way is weighed by the function that picks, so both agree to the last bit.
 
-use super::group::{Group, WIDTH};
+use super::group::WIDTH;
 use super::leaves::{Route, find_placed, lane_toward};
 use super::node::Link;
-use super::sampling::{FrameTree, Next, Place, Weights};
+use super::place::{Next, Place, Weighed};
+use super::sampling::FrameTree;
 use super::viewer::Viewer;
 
 impl FrameTree<'_> {
@@ -25,30 +26,33 @@ impl FrameTree<'_> {
         probability.unwrap_or(0.0)
     }
 
-    /// Calls `visit` with every emitter that is not forced and may be picked for a viewer, and the
-    /// [`probability`](FrameTree::probability) of that: of all of them in one walk.
+    /// Calls `visit` with every emitter that may be picked for a viewer, and its
+    /// [`probability`](FrameTree::probability). One walk finds all. Forced lights are left out.
     pub fn for_each_probability(&self, viewer: &impl Viewer, mut visit: impl FnMut(u32, f64)) {
         let mut open: Vec<_> =
             self.place_of_root(viewer).map(|root| (root, 1.0)).into_iter().collect();
         let mut reached = Vec::new();
         while let Some((root, probability)) = open.pop() {
-            let groups = self.groups_of_tree_at(root.at);
             reached.clear();
-            reached.resize(groups.len(), 0.0);
-            reached.iter_mut().take(1).for_each(|first| *first = probability);
+            reached.push(probability);
             // Groups stand in preorder: when one is met, the way to it has been.
-            for (at, group) in groups.iter().enumerate() {
-                let before: f64 = reached[at];
-                let weights = Weights::of(group, &root.viewer).filter(|_| before > 0.0);
-                let Some(weights) = weights else { continue };
-                for lane in (0..WIDTH).filter(|&lane| weights.of_lane[lane] > 0.0) {
-                    let probability = before * weights.share(lane);
-                    if let Link::Inner(ahead) = group.link(lane) {
-                        let below = reached.get_mut(at + ahead as usize);
-                        below.into_iter().for_each(|below| *below = probability);
+            for (at, place) in self.groups_below(&root).enumerate() {
+                let before = reached.get(at).copied().unwrap_or(0.0);
+                if before <= 0.0 {
+                    continue;
+                }
+                let Some(choice) = self.weigh(&place).and_then(Weighed::choice) else { continue };
+                for lane in (0..WIDTH).filter(|&lane| choice.of_lane[lane] > 0.0) {
+                    let probability = before * choice.share(lane);
+                    if let Link::Inner(ahead) = choice.group.link(lane) {
+                        let below = at + ahead as usize;
+                        if below < self.groups.len() {
+                            reached.resize(reached.len().max(below + 1), 0.0);
+                            reached[below] = probability;
+                        }
                         continue;
                     }
-                    match self.follow(&root, group.link(lane)) {
+                    match self.follow(&place, choice.group, lane) {
                         Some(Next::Emitter(emitter)) => visit(emitter, probability),
                         Some(Next::Group(below)) => open.push((below, probability)),
                         None => {}
@@ -56,14 +60,6 @@ impl FrameTree<'_> {
                 }
             }
         }
-    }
-
-    /// All groups of the tree that has its root's children here.
-    fn groups_of_tree_at(&self, first: u32) -> &[Group] {
-        let after = self.trees.partition_point(|tree| tree.first_group <= first);
-        let count = after.checked_sub(1).map_or(0, |row| self.trees[row].group_count);
-        let rest = self.groups.get(first as usize..).unwrap_or_default();
-        &rest[..rest.len().min(count as usize)]
     }
 
     pub(super) fn route(&self, emitter: u32) -> Option<Route> {
@@ -78,8 +74,7 @@ impl FrameTree<'_> {
         self.walk(self.place_of_forced(light, viewer)?, &route, 0)
     }
 
-    /// The probability of a descent from a place to the end of a route, so many of whose legs lie
-    /// behind.
+    /// The probability of a descent from a place to the end of a route, of which `legs` legs lie behind.
     pub(super) fn walk<V: Viewer>(
         &self,
         mut place: Place<V>,
@@ -90,14 +85,14 @@ impl FrameTree<'_> {
         for (leg, &slot) in route.slots[..route.count].iter().enumerate().skip(legs) {
             let target = slot / WIDTH as u32;
             loop {
-                let group = self.group(&place)?;
+                let choice = self.weigh(&place)?.choice()?;
                 let is_last = place.at == target;
                 let lane = match is_last {
                     true => slot as usize % WIDTH,
-                    false => lane_toward(group, target.checked_sub(place.at)?)?,
+                    false => lane_toward(choice.group, target.checked_sub(place.at)?)?,
                 };
-                probability *= Weights::of(group, &place.viewer)?.share(lane);
-                match self.follow(&place, group.link(lane))? {
+                probability *= choice.share(lane);
+                match self.follow(&place, choice.group, lane)? {
                     Next::Group(next) => place = next,
                     Next::Emitter(_) if is_last && leg + 1 == route.count => {
                         return Some(probability);

@@ -14,7 +14,10 @@ pub const FRAMES: SectionId = SectionId(*b"FRAM");
 pub const FORCED: SectionId = SectionId(*b"FORC");
 pub const LIGHTS: SectionId = SectionId(*b"LGHT");
 pub const PATHS: SectionId = SectionId(*b"PATH");
-pub const ALL: [SectionId; 8] = [META, TREES, GROUPS, INSTANCES, FRAMES, FORCED, LIGHTS, PATHS];
+pub const TEXTURES: SectionId = SectionId(*b"TXTR");
+pub const MEANS: SectionId = SectionId(*b"MEAN");
+pub const ALL: [SectionId; 10] =
+    [META, TREES, GROUPS, INSTANCES, FRAMES, FORCED, LIGHTS, PATHS, TEXTURES, MEANS];
 
 /// One tree of a file.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
@@ -160,5 +163,35 @@ impl LightRow {
     /// Whether its class has a property.
     pub fn is(&self, property: u32) -> bool {
         self.class & property != 0
+    }
+}
+
+/// A mesh with an emission texture: a run of [`MeanRow`]s.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
+#[repr(C)]
+pub struct TextureRow {
+    /// BLAKE3 over everything that the means depend on.
+    pub fingerprint: [u8; 32],
+    /// Its first mean.
+    pub first: u32,
+    /// How many it has.
+    pub count: u32,
+}
+
+/// The mean of a texture over a triangle that is not dark.
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub struct MeanRow {
+    /// The triangle's number in its mesh.
+    pub triangle: u32,
+    /// Linear Rec. 709.
+    pub mean: [f32; 3],
+}
+
+impl MeanRow {
+    /// Whether it is what a mean can be: finite, not negative, and not black.
+    pub(super) fn is_sound(&self) -> bool {
+        let is_light = |&part: &f32| part.is_finite() && part >= 0.0;
+        self.mean.iter().all(is_light) && self.mean != [0.0; 3]
     }
 }

@@ -1,50 +1,51 @@
-//! How many samples a viewer is worth, and how far the tree is opened for it.
+//! Splitting: how far the tree is opened for a viewer, and how many samples the viewer gets.
 //!
-//! The seed splits a cluster where one sample of it is not enough, and every part that is not split
-//! further gets one: each decision costs a shadow ray, and where decisions change there are seams in
-//! the noise. Looking is cheaper than tracing. So here the tree is first [opened](super::cut) where
-//! its estimates are uncertain, without taking any sample; and from the clusters that this leaves, the
-//! *cut*, so many are sampled as the uncertainty that remains is worth, a real number, each cluster
-//! with a chance in proportion to its importance and none twice. One sample is a plain pick, all
-//! clusters are all of them, and everything between varies smoothly. (Cuts: Walter et al. 2005;
-//! sampling them: Yuksel 2019, "Stochastic Lightcuts".) The seed's own rule stays for comparison.
+//! The seed splits a cluster where one sample of it is not enough, and samples every part once. Each
+//! decision then costs a shadow ray, and noise has seams where decisions change. Looking at a cluster
+//! is cheaper than tracing a ray. So here the tree is first [opened](super::cut) where its estimates
+//! are uncertain, and no sample is taken yet. What this leaves is the *cut*. The relative variance that
+//! remains in the cut decides how many samples it gets, as a real number. Clusters are sampled in
+//! proportion to their importance, and none twice. One sample is a plain descent of the tree, as many
+//! samples as clusters takes them all, and everything between varies smoothly. (Cuts: Walter et al.
+//! 2005. Sampling them: Yuksel 2019, "Stochastic Lightcuts".) The seed's own rule stays for comparison.
 
 /// How splitting is asked for.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Splitting {
-    /// `[0, 1]`: 0 takes one sample at a point, 1 takes every emitter that may light it. Means the
-    /// same at every scale of lengths and of energies.
+    /// In `[0, 1]`: 0 takes one sample at a point, 1 takes every emitter that may light it. Its meaning
+    /// does not depend on the scale of lengths or energies.
     pub knob: f32,
-    /// At most so many samples at a point.
+    /// The most samples at a point.
     pub most: u32,
-    /// What is opened, and what then is sampled.
+    /// The test that decides what is opened.
     pub test: SplitTest,
 }
 
-/// What makes a cluster worth splitting.
+/// The test that decides whether a cluster is opened.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum SplitTest {
-    /// Its part in the relative variance of one sample: its share of all importance times the squared
-    /// relative deviation within it. As many samples are taken as what is left of that is worth.
+    /// The cluster's part in the relative variance of one sample: its share of all importance times
+    /// the squared relative deviation within it. The relative variance that remains in the cut
+    /// decides the number of samples.
     #[default]
     Variance,
-    /// The seed's: its solid angle times the peak of the BSDF towards it. Every cluster of the cut is
-    /// sampled.
+    /// The seed's: the cluster's solid angle times the peak of the BSDF towards it. Every cluster of
+    /// the cut is sampled.
     SolidAngle,
 }
 
-/// At half a turn of the knob: the part in the relative variance above which a cluster is opened...
+/// At knob 0.5, a cluster is opened if its part in the relative variance is above this.
 const OPENED_ABOVE: f64 = 0.007;
-/// ...and the relative variance that is worth one more sample.
+/// At knob 0.5, so much relative variance is worth one more sample.
 const WORTH_A_SAMPLE: f64 = 0.013;
-/// The seed's measure above which a cluster is split at half a turn.
+/// At knob 0.5, the seed's rule splits a cluster whose measure is above this.
 const GLARE: f64 = 2.0;
 
 impl Splitting {
     /// One sample at a point, by a plain descent.
     pub const NONE: Splitting = Splitting { knob: 0.0, most: u32::MAX, test: SplitTest::Variance };
 
-    /// Every emitter that may light a point.
+    /// Every emitter that may light a point, once.
     pub const ALL: Splitting = Splitting { knob: 1.0, ..Splitting::NONE };
 
     /// Whether the tree is not opened at all.
@@ -57,18 +58,18 @@ impl Splitting {
         self.knob >= 1.0
     }
 
-    /// What the knob multiplies thresholds by: from infinity down to zero.
+    /// The factor of the knob on thresholds: infinite at knob 0, zero at knob 1.
     fn ease(&self) -> f64 {
         let knob = f64::from(self.knob).clamp(0.0, 1.0);
         (1.0 - knob) / knob
     }
 
-    /// The measure above which a cluster is opened.
+    /// A cluster is opened if its measure is above this.
     pub(super) fn threshold(&self) -> f64 {
         self.ease() * if self.test == SplitTest::SolidAngle { GLARE } else { OPENED_ABOVE }
     }
 
-    /// How many of some clusters are sampled, given the relative variance of one sample of them.
+    /// How many samples a cut of some clusters gets, given the relative variance of one sample.
     pub(super) fn worth(&self, variance: f64, clusters: usize) -> f64 {
         let all = (clusters as f64).min(f64::from(self.most)).max(1.0);
         if self.is_full() || self.test == SplitTest::SolidAngle {
@@ -81,9 +82,9 @@ impl Splitting {
 /// The largest number below 1.
 pub(super) const BELOW_ONE: f64 = 1.0 - f64::EPSILON / 2.0;
 
-/// Gives at most so many of some clusters a sample: each with a chance in proportion to its weight, but
-/// not above its cap, which is 1 or less. The chances add up to the count, or to all caps of weights
-/// that are not zero if that is less.
+/// Allots `count` samples: each cluster gets a chance in proportion to its weight, but not above its
+/// cap, which is at most 1. The chances add up to the count, or to the caps of all weights above zero
+/// if those are less.
 pub(super) fn allot(weights: &[f64], caps: &[f64], count: u32, chances: &mut Vec<f64>) {
     chances.clear();
     if weights.iter().filter(|&&weight| weight > 0.0).count() <= count as usize {
@@ -92,7 +93,7 @@ pub(super) fn allot(weights: &[f64], caps: &[f64], count: u32, chances: &mut Vec
         return;
     }
     chances.resize(weights.len(), 0.0);
-    // Those at their caps keep them; what is left goes to the others.
+    // Clusters at their caps keep them. The rest of the count goes to the others.
     let mut left = f64::from(count);
     loop {
         let alive = || weights.iter().zip(caps).zip(chances.iter());
@@ -117,14 +118,15 @@ pub(super) fn allot(weights: &[f64], caps: &[f64], count: u32, chances: &mut Vec
     }
 }
 
-/// Which clusters are taken, by one number in `[0, 1)`: all that are sure, and of the others, laid out
-/// along a line, those that a comb of step 1 meets (systematic sampling: neighbours in the tree are
-/// neighbours on the line, so samples are spread over the scene). With each comes what is left of the
-/// number, uniform in `[0, 1)`; a sure one leaves it whole.
+/// Takes clusters by one number in `[0, 1)`. Clusters whose chance is 1 are always taken. The chances of
+/// the others are laid end to end on a line, and a comb whose teeth are 1 apart takes those that it
+/// meets. This is systematic sampling: neighbours in the tree are neighbours on the line, so the
+/// samples are stratified over the scene. Each cluster comes with a fresh number in `[0, 1)`, stretched
+/// from the first; one that is always taken gets the number itself.
 pub(super) fn comb(chances: &[f64], u: f64) -> impl Iterator<Item = (usize, f64)> + '_ {
     let mut end = 0.0;
-    // The comb's teeth stand at u, u + 1, ...; `next` is the first that no cluster has met. There are
-    // no more than the chances add up to, also where rounding leaves room for another.
+    // The teeth stand at u, u + 1, ...; `next` is the first that no cluster has met. There are no more
+    // teeth than the chances add up to, even where rounding would leave room for one.
     let mut next = u;
     let open: f64 = chances.iter().filter(|&&chance| chance < 1.0).sum();
     let last = u + (open - 1e-9).ceil();
@@ -146,7 +148,7 @@ pub(super) fn comb(chances: &[f64], u: f64) -> impl Iterator<Item = (usize, f64)
     })
 }
 
-/// A real number of samples as one of the two whole numbers beside it.
+/// A real number of samples, rounded at random to one of its two neighbours.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Rounded {
     pub low: u32,
@@ -160,7 +162,7 @@ impl Rounded {
         Rounded { low: low as u32, chance_of_more: worth - low }
     }
 
-    /// One of the two by a number in `[0, 1)`, and what is left of that.
+    /// Draws one of the two by a number in `[0, 1)`; also returns a fresh number stretched from it.
     pub fn draw(&self, u: f64) -> (u32, f64) {
         let more = self.chance_of_more;
         if u < more {

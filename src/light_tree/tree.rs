@@ -1,7 +1,9 @@
 //! A light tree file, opened: the same type over bytes just built and bytes just mapped.
 
 use super::group::Group;
-use super::records::{self, FrameRow, InstanceRow, LightRow, NO_TREE, TreeKind, TreeRow};
+use super::records::{
+    self, FrameRow, InstanceRow, LightRow, MeanRow, NO_TREE, TextureRow, TreeKind, TreeRow,
+};
 use crate::store::{self, Container, Section, SectionId, StoreError};
 use bytemuck::Pod;
 use std::ops::Range;
@@ -21,6 +23,8 @@ pub struct LightTree<D> {
     forced: Option<Range<usize>>,
     lights: Range<usize>,
     paths: Range<usize>,
+    textures: Option<Range<usize>>,
+    means: Option<Range<usize>>,
     /// Whether walks end soon, once that is known.
     walkable: OnceLock<bool>,
 }
@@ -47,6 +51,8 @@ impl<D: AsRef<[u8]>> LightTree<D> {
             forced: container.find::<u32>(records::FORCED)?,
             lights: required::<LightRow>(&container, records::LIGHTS)?,
             paths: required::<u8>(&container, records::PATHS)?,
+            textures: container.find::<TextureRow>(records::TEXTURES)?,
+            means: container.find::<MeanRow>(records::MEANS)?,
             walkable: OnceLock::new(),
             container,
         })
@@ -63,6 +69,8 @@ impl<D: AsRef<[u8]>> LightTree<D> {
             forced: self.forced.clone(),
             lights: self.lights.clone(),
             paths: self.paths.clone(),
+            textures: self.textures.clone(),
+            means: self.means.clone(),
             walkable: self.walkable.clone(),
         }
     }
@@ -125,6 +133,24 @@ impl<D: AsRef<[u8]>> LightTree<D> {
         paths.get(start..).and_then(|rest| rest.get(..length)).unwrap_or_default()
     }
 
+    /// Meshes with emission textures, by ascending fingerprint.
+    pub fn textures(&self) -> &[TextureRow] {
+        self.textures.as_ref().map_or(&[], |range| self.container.view(range))
+    }
+
+    /// The means of these textures, mesh after mesh.
+    pub fn means(&self) -> &[MeanRow] {
+        self.means.as_ref().map_or(&[], |range| self.container.view(range))
+    }
+
+    /// The means of the texture that has a fingerprint, by ascending triangle.
+    pub fn means_of(&self, fingerprint: &[u8; 32]) -> Option<&[MeanRow]> {
+        let rows = self.textures();
+        let at = rows.binary_search_by_key(fingerprint, |row| row.fingerprint).ok()?;
+        let TextureRow { first, count, .. } = rows[at];
+        self.means().get(first as usize..)?.get(..count as usize)
+    }
+
     /// How many emitters the lights have.
     pub fn emitter_count(&self) -> usize {
         self.lights().last().map_or(0, |l| l.first_emitter as usize + l.emitter_count as usize)
@@ -171,7 +197,7 @@ impl<D: AsRef<[u8]>> LightTree<D> {
     }
 
     /// The row of the tree of what stands still, if there is one.
-    pub(super) fn still_tree(&self) -> Option<u32> {
+    pub fn still_tree(&self) -> Option<u32> {
         // Trees stand in the order of their kinds.
         let row = self.trees().partition_point(|row| row.kind < TreeKind::Still as u32);
         let kind = self.trees().get(row).and_then(TreeKind::of);

@@ -1,35 +1,34 @@
-//! The exact variance of an estimate that samples lights through the tree: no noise, no draws.
+//! The exact variance of an estimator that samples lights through the tree, without drawing a number.
 //!
-//! Given what each light contributes, the variance of the sum over the picks follows in closed form.
-//! A cluster of the cut that contributes `F_c`, with a variance `V_c` of its own, is taken with a
-//! chance `n_c` and divided by `q_c`, adds `n_c V_c / q_c^2`; to which comes the variance over the
-//! choice of clusters of the sum of `F_c / q_c`. A comb takes them, so the latter is a step function
-//! of one number, which is integrated exactly. The two counts of samples that are drawn between mix
-//! by the law of total variance. Below a cluster, one descent has `sum of (V + F^2) / p - F^2`, group by
-//! group.
+//! Given the contribution of each light, the variance of the sum over the picks has a closed form.
+//! Let an entry of the cut contribute `F_c`, with a variance `V_c` within it, and let it be taken with
+//! the chance `n_c` and divided by `q_c`. It adds `n_c V_c / q_c^2`. To this comes the variance of the sum
+//! of `F_c / q_c` over the choice of entries. A comb takes them, so that sum is a step function of one
+//! number, which is integrated exactly. The two counts of samples mix by the law of total variance.
+//! Below an entry, one descent has the second moment `sum of (V + F^2) / p`, group by group.
 
 use super::cut::{Entry, Picked, Scratch};
 use super::group::WIDTH;
-use super::node::Link;
-use super::sampling::{FrameTree, Next, Place, Weights};
+use super::place::{Choice, Next, Place};
+use super::sampling::FrameTree;
 use super::splitting::{Splitting, comb};
 use super::viewer::Viewer;
 
-/// What an estimate is expected to be, and how far off.
+/// Mean and variance of an estimator.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Moments {
-    /// What it is in the mean: the sum of all contributions that can be picked.
+    /// The sum of all contributions that can be picked.
     pub mean: f64,
     /// Its variance.
     pub variance: f64,
-    /// How many lights are sampled.
+    /// The expected number of samples.
     pub lights: f64,
 }
 
 impl FrameTree<'_> {
-    /// The moments of the estimate of a sum over all lights from its
-    /// [picks](FrameTree::for_each_pick), given what each contributes, which may depend on how often
-    /// it is expected to be picked. Forced lights are no part of it.
+    /// The moments of an estimator of the sum over all lights by its
+    /// [picks](FrameTree::for_each_pick). `contribution` takes a light and the expected number of
+    /// samples of it. Forced lights are left out.
     pub fn moments<V: Viewer>(
         &self,
         viewer: &V,
@@ -74,8 +73,9 @@ impl FrameTree<'_> {
         }
     }
 
-    /// Mean and variance of what one descent from a place finds, over its probability; `expected` is
-    /// how many descents there are. Levels are kept in a list: a tree may be deeper than the stack.
+    /// Mean and variance of what one descent from a place finds, divided by its probability;
+    /// `expected` is the number of descents. Levels are kept in a list: a tree may be deeper than the
+    /// stack.
     fn below<V: Viewer>(
         &self,
         place: Place<V>,
@@ -85,7 +85,7 @@ impl FrameTree<'_> {
         let mut levels: Vec<Level<V>> = self.level(place, expected).into_iter().collect();
         let mut found = (0.0, 0.0);
         while let Some(level) = levels.last_mut() {
-            let alive = |lane: &usize| level.weights.of_lane[*lane] > 0.0;
+            let alive = |lane: &usize| level.choice.of_lane[*lane] > 0.0;
             let Some(lane) = (level.next..WIDTH).find(alive) else {
                 let Level { mean, second, .. } = *level;
                 found = (mean, (second - mean * mean).max(0.0));
@@ -96,8 +96,8 @@ impl FrameTree<'_> {
                 continue;
             };
             level.next = lane + 1;
-            let expected = level.expected * level.weights.share(lane);
-            match self.follow(&level.place, level.links[lane]) {
+            let expected = level.expected * level.choice.share(lane);
+            match self.follow(&level.place, level.choice.group, lane) {
                 None => {}
                 Some(Next::Group(place)) => levels.extend(self.level(place, expected)),
                 Some(Next::Emitter(emitter)) => {
@@ -108,42 +108,39 @@ impl FrameTree<'_> {
         found
     }
 
-    fn level<V: Viewer>(&self, place: Place<V>, expected: f64) -> Option<Level<V>> {
-        let group = self.group(&place)?;
-        let weights = Weights::of(group, &place.viewer)?;
-        let links = std::array::from_fn(|lane| group.link(lane));
-        Some(Level { place, weights, links, expected, next: 0, mean: 0.0, second: 0.0 })
+    fn level<V: Viewer>(&self, place: Place<V>, expected: f64) -> Option<Level<'_, V>> {
+        let choice = self.weigh(&place)?.choice()?;
+        Some(Level { place, choice, expected, next: 0, mean: 0.0, second: 0.0 })
     }
 }
 
-/// A group on the way of a walk over all that a descent may find.
-struct Level<V> {
+/// A group of a depth-first walk over all that a descent may find.
+struct Level<'a, V> {
     place: Place<V>,
-    weights: Weights,
-    links: [Link; WIDTH],
-    /// How many descents come here.
+    choice: Choice<'a>,
+    /// The expected number of descents that come here.
     expected: f64,
-    /// The lane that is looked at next.
+    /// The next lane to look at.
     next: usize,
-    /// Mean and second moment of what its lanes before that give.
+    /// Mean and second moment over the lanes before it.
     mean: f64,
     second: f64,
 }
 
-impl<V> Level<V> {
-    /// Adds what a lane gives, by its mean and variance.
+impl<V> Level<'_, V> {
+    /// Adds a lane, by its mean and variance.
     fn add(&mut self, lane: usize, (mean, variance): (f64, f64)) {
         self.mean += mean;
-        self.second += (variance + mean * mean) / self.weights.share(lane);
+        self.second += (variance + mean * mean) / self.choice.share(lane);
     }
 }
 
-/// Mean and variance of a sum over the clusters that a comb takes, given those of each that is taken.
+/// Mean and variance of the sum over the entries that a comb takes, given those of each entry.
 fn of_comb(chances: &[f64], of_entry: &[(f64, f64)]) -> (f64, f64) {
     let alive = || chances.iter().zip(of_entry).filter(|(chance, _)| **chance > 0.0);
     let mean: f64 = alive().map(|(chance, (mean, _))| chance * mean).sum();
     let within: f64 = alive().map(|(chance, (_, variance))| chance * variance).sum();
-    // Between two neighbouring fractions of the clusters' ends the comb takes the same ones.
+    // The comb takes the same entries for all numbers between two neighbouring ends, modulo 1.
     let is_open = |chance: f64| chance > 0.0 && chance < 1.0;
     let (mut end, mut expected) = (0.0, 0.0);
     let mut steps = vec![1.0];

@@ -1,32 +1,33 @@
-//! Who asks for light: a point of a surface, a point of a medium, or a stretch of a ray.
+//! Viewers: what light is wanted for. A point of a surface, a point in a medium, or a stretch of a ray.
 //!
-//! A [`Viewer`] tells what a cluster may send to it and how uncertain that estimate is. The one
-//! description is shared by sampling and by its probability, so that they cannot disagree about
-//! where they stand. Viewers are copied into the space of a shared subtree when a walk enters it.
+//! A [`Viewer`] tells how much light a cluster may send to it, and how uncertain that is. Sampling and
+//! its probability share this one description, so they cannot disagree. When a walk enters the tree of
+//! an instance, it takes the viewer along into that tree's space.
 
 use super::importance::{Cluster, Factors, Sight, factors};
 use crate::math::Similarity;
 use glam::Vec3;
 
-/// Something that light is wanted for. What a `Cluster` is stays inside this room, and so do the
-/// implementations.
+/// Something that light is wanted for. `Cluster` is private to this room, so only this room implements
+/// viewers.
 pub trait Viewer: Copy {
-    /// What the importance of a cluster is made of, and how uncertain it is.
+    /// The factors of the importance of a cluster, and how uncertain it is.
     fn factors(&self, cluster: &Cluster) -> Factors;
 
-    /// What becomes of light that comes from somewhere, if [`factors`](Viewer::factors) does not know:
-    /// another factor of the importance, and how uncertain that one is.
+    /// A further factor of the importance, where [`factors`](Viewer::factors) leaves it open what
+    /// becomes of the light; and what it adds to the spread.
     #[inline(always)]
     fn reflect(&self, _sight: &Sight) -> (f32, f32) {
         (1.0, 0.0)
     }
 
-    /// The seed's test of splitting: the solid angle of a cluster times the peak of the BSDF towards
+    /// The seed's measure for splitting: the solid angle of a cluster times the peak of the BSDF towards
     /// it.
     fn glare(&self, cluster: &Cluster) -> f64;
 
-    /// What an importance in a space whose lengths are `scale` times as long is worth in this one,
-    /// if energies are scaled by its square: an irradiance is worth the same.
+    /// The factor from importances in another space to importances in this one, where lengths there
+    /// are `scale` times as long and energies `scale^2` times as high. An irradiance is the same in
+    /// both.
     fn unit_of_importance(&self, _scale: f64) -> f64 {
         1.0
     }
@@ -40,13 +41,13 @@ pub trait Viewer: Copy {
 pub struct Receiver {
     /// World space, metres.
     pub point: Vec3,
-    /// Unit shading normal on the side that is lit, world space; zero if light from every
-    /// direction counts (a point in a medium).
+    /// Unit shading normal, on the side that is lit, world space. Zero for a point in a medium, where
+    /// light from every direction counts.
     pub normal: Vec3,
 }
 
-/// A viewer that knows nothing of the lights' orientations: with a receiver that has no normal, the
-/// middle picture of the seed's "Results", for comparison.
+/// A viewer that ignores how lights are oriented. With a receiver that has no normal it gives the middle
+/// picture of the seed's "Results", for comparison.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DistanceOnly<V>(pub V);
 

@@ -5,7 +5,8 @@ use super::builder::build_tree;
 use super::group::{Group, WIDTH};
 use super::node::{Link, Node};
 use super::records::{
-    self, FrameRow, InstanceRow, LightLook, LightRow, NO_TREE, TreeKind, TreeRow,
+    self, FrameRow, InstanceRow, LightLook, LightRow, MeanRow, NO_TREE, TextureRow, TreeKind,
+    TreeRow,
 };
 use crate::bounds::LightBounds;
 use crate::math::Similarity;
@@ -55,7 +56,7 @@ impl<'a> LightList<'a> {
     }
 
     /// A row of the section of lights.
-    fn row(&self, at: usize) -> LightRow {
+    pub fn row(&self, at: usize) -> LightRow {
         let light = &self.lights[at];
         let (first_emitter, path_offset) = self.starts[at];
         LightRow {
@@ -90,6 +91,8 @@ pub struct LightTreeWriter<'a> {
     instances: Vec<InstanceRow>,
     frames: Vec<FrameRow>,
     forced: Vec<u32>,
+    textures: Vec<TextureRow>,
+    means: Vec<MeanRow>,
 }
 
 impl<'a> LightTreeWriter<'a> {
@@ -97,6 +100,12 @@ impl<'a> LightTreeWriter<'a> {
     /// without it.
     pub fn upon(base: Base<'a>) -> LightTreeWriter<'a> {
         LightTreeWriter { base: Some(base), ..LightTreeWriter::default() }
+    }
+
+    /// Whether the base was found to [contradict](Base::contradicts) the bounds so far. Then what was
+    /// built upon it is not to be used.
+    pub fn base_contradicts(&self) -> bool {
+        self.base.as_ref().is_some_and(Base::contradicts)
     }
 
     /// How many leaves the trees have so far.
@@ -120,11 +129,11 @@ impl<'a> LightTreeWriter<'a> {
     ) -> Option<u32> {
         let first_group = self.groups.len();
         let mut groups = std::mem::take(&mut self.groups);
-        let (count, leaf) = (bounds.len(), |i| self.leaf(stands_for(i)));
+        let leaf = |i| self.leaf(stands_for(i));
         let earlier = || match kind {
             TreeKind::Shared => None,
-            TreeKind::Still => self.base.as_ref()?.still(count, leaf),
-            TreeKind::Frame => self.base.as_ref()?.frame(self.frames.len(), count, leaf),
+            TreeKind::Still => self.base.as_ref()?.still(bounds, leaf),
+            TreeKind::Frame => self.base.as_ref()?.frame(self.frames.len(), bounds, leaf),
         };
         let built = build_tree(bounds, &stands_for, earlier, &mut groups);
         self.groups = groups;
@@ -141,9 +150,15 @@ impl<'a> LightTreeWriter<'a> {
     }
 
     /// Adds the `nth` tree of its own that a light has in the base, and returns its row; `None` if the
-    /// light has changed. The light is named by its place among those of the new file.
-    pub fn add_tree_of_base(&mut self, light: usize, nth: usize) -> Option<u32> {
-        let (row, groups) = self.base.as_ref()?.own_tree(light, nth)?;
+    /// light, which has these bounds now, has changed. The light is named by its place among those of
+    /// the new file.
+    pub fn add_tree_of_base(
+        &mut self,
+        light: usize,
+        nth: usize,
+        bounds: &[LightBounds],
+    ) -> Option<u32> {
+        let (row, groups) = self.base.as_ref()?.own_tree(light, nth, bounds)?;
         self.trees.push(TreeRow { first_group: self.groups.len() as u32, ..*row });
         self.groups.extend_from_slice(groups);
         self.reused += row.leaf_count as usize;
@@ -222,6 +237,15 @@ impl<'a> LightTreeWriter<'a> {
         self.forced.extend_from_slice(instances);
     }
 
+    /// Keeps the means of a texture over the triangles of a mesh, the triangles ascending. Textures
+    /// must be added by ascending fingerprint.
+    pub fn add_texture(&mut self, fingerprint: [u8; 32], means: impl Iterator<Item = MeanRow>) {
+        let first = self.means.len() as u32;
+        self.means.extend(means);
+        let count = self.means.len() as u32 - first;
+        self.textures.push(TextureRow { fingerprint, first, count });
+    }
+
     /// The bytes of the file.
     pub fn finish(self, lights: &LightList, meta: &str, fingerprint: [u8; 32]) -> AlignedBytes {
         let mut file = ContainerWriter::default();
@@ -244,6 +268,11 @@ impl<'a> LightTreeWriter<'a> {
         file.section_with(records::PATHS, true, lights.path_length, |place: &mut [u8]| {
             lights.write_paths(place);
         });
+        // Nobody needs them to sample the trees.
+        if !self.textures.is_empty() {
+            file.section(records::TEXTURES, false, &self.textures);
+            file.section(records::MEANS, false, &self.means);
+        }
         file.finish(fingerprint)
     }
 }

@@ -1,4 +1,5 @@
-//! Random numbers by counting: a number depends on where it is asked for, never on who asked first.
+//! Random numbers by counting: a number depends on the place that it is for, never on the order in which
+//! places are asked about.
 //!
 //! [`hash`] mixes integers into a seed. [`Sampler`] deals the low-discrepancy numbers of one path:
 //! an Owen-scrambled Sobol sequence, scrambled anew for each pixel and each group of four

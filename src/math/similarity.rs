@@ -1,4 +1,4 @@
-//! Maps that keep shapes: rotation, reflection, uniform scale, translation.
+//! Transforms that keep shapes: rotation, reflection, even scale, translation.
 
 use bytemuck::{Pod, Zeroable};
 use glam::{Affine3A, Mat3, Vec3};
@@ -6,7 +6,7 @@ use glam::{Affine3A, Mat3, Vec3};
 /// How far the axes may be from equal lengths and right angles, relative.
 const TOLERANCE: f64 = 1e-4;
 
-/// A map from one space to another that keeps all shapes, as stored in files.
+/// A map from one space to another that keeps all shapes. Files store it.
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct Similarity {
@@ -17,11 +17,11 @@ pub struct Similarity {
 }
 
 impl Similarity {
-    /// What changes nothing.
+    /// The map that changes nothing.
     pub const IDENTITY: Similarity =
         Similarity { axes: [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], origin: [0.0; 3] };
 
-    /// The map that undoes a transform, if that keeps shapes and is not flat.
+    /// The map that undoes a transform; `None` if the transform is flat or does not keep shapes.
     pub fn undoing(transform: &Affine3A) -> Option<Similarity> {
         let linear = transform.matrix3.as_dmat3();
         let inverse = linear.inverse();
@@ -49,10 +49,12 @@ impl Similarity {
         Vec3::from_array(self.axes[0]).length()
     }
 
-    /// Where a point goes.
+    /// Where a point goes. In double precision until the end: far from the origin the two terms are
+    /// large and nearly cancel.
     #[inline]
     pub fn point(&self, p: Vec3) -> Vec3 {
-        self.linear() * p + Vec3::from_array(self.origin)
+        let there = self.linear().as_dmat3() * p.as_dvec3();
+        (there + Vec3::from_array(self.origin).as_dvec3()).as_vec3()
     }
 
     /// Where a unit direction points to, unit again; zero stays zero.

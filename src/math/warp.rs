@@ -1,5 +1,6 @@
-//! Maps of the unit square onto the shapes that lights and lobes are sampled from. Each keeps area
-//! up to a constant; the density that belongs to it stands beside it.
+//! Maps of the unit square onto the shapes that lights and lobes are sampled from.
+//!
+//! Each map keeps area up to a constant. Its density stands beside it.
 
 use glam::{Vec2, Vec3};
 use std::f32::consts::{FRAC_1_PI, FRAC_PI_2, FRAC_PI_4, TAU};
@@ -36,13 +37,14 @@ pub fn cosine_hemisphere_pdf(cosine: f32) -> f32 {
 #[inline]
 pub fn sphere(u: Vec2) -> Vec3 {
     let z = 1.0 - 2.0 * u.x;
-    let radius = (1.0 - z * z).max(0.0).sqrt();
+    // Not `1 - z^2`, which cancels near the poles.
+    let radius = 2.0 * (u.x * (1.0 - u.x)).sqrt();
     let (sin, cos) = (TAU * u.y).sin_cos();
     Vec3::new(radius * cos, radius * sin, z)
 }
 
 /// The cap of directions about +Z whose `1 - cos` is at most `one_minus_cos_max`, evenly. Density
-/// [`cone_pdf`]. Taking `1 - cos` and not `cos` keeps caps of 1e-4 rad and less exact.
+/// [`cone_pdf`]. `1 - cos` keeps its digits in caps of 1e-4 rad and less, where `cos` is 1.
 #[inline]
 pub fn cone(u: Vec2, one_minus_cos_max: f32) -> Vec3 {
     let one_minus_cos = u.x * one_minus_cos_max;
@@ -94,13 +96,33 @@ mod tests {
     }
 
     #[test]
-    fn a_narrow_cone_stays_inside_itself() {
-        let angle = 1e-4_f64;
-        let cap = (2.0 * (angle / 2.0).sin().powi(2)) as f32;
-        for i in 0..=100 {
-            let direction = cone(Vec2::new(i as f32 / 100.0, 0.3), cap);
-            let off_axis = f64::from(direction.truncate().length());
-            assert!(off_axis <= angle * (1.0 + 1e-5));
+    fn cones_of_every_width_stay_inside_themselves_and_are_even() {
+        for decade in -18..=0 {
+            let angle = 3.0 * 10f64.powi(decade);
+            let cap = (2.0 * (angle / 2.0).sin().powi(2)) as f32;
+            for i in 0..=100 {
+                let direction = cone(Vec2::new(i as f32 / 100.0, 0.3), cap).as_dvec3();
+                let off = direction.truncate().length().atan2(direction.z);
+                // Even: `1 - cos` grows with the first number.
+                let expected = (f64::from(i) / 100.0).sqrt() * (angle / 2.0).sin();
+                assert!(((off / 2.0).sin() / expected - 1.0).abs() < 1e-4 || i == 0, "{off}");
+            }
+        }
+    }
+
+    #[test]
+    fn directions_keep_their_angle_to_the_pole() {
+        for decade in 0..24 {
+            let u = 0.9 * 0.5f32.powi(decade);
+            for (direction, side) in
+                [(sphere(Vec2::new(u, 0.3)), 1.0), (sphere(Vec2::new(1.0 - u, 0.3)), -1.0)]
+            {
+                let share = if side > 0.0 { f64::from(u) } else { f64::from(1.0 - (1.0 - u)) };
+                let across = direction.truncate().as_dvec2().length();
+                let expected = 2.0 * (share * (1.0 - share)).sqrt();
+                assert!((across / expected - 1.0).abs() < 1e-6, "{u} {across} {expected}");
+                assert!((direction.length() - 1.0).abs() < 1e-6);
+            }
         }
     }
 }

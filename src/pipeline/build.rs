@@ -2,13 +2,14 @@
 
 use super::Survey;
 use super::survey::{Group, PlacedLight};
+use super::textures;
 use crate::bounds::{Aabb, Cone, LightBounds};
 use crate::light_tree::{
     ALGORITHM_VERSION, Base, LightList, LightTree, LightTreeWriter, Link, TreeKind,
 };
 use crate::math::Similarity;
 use crate::store::AlignedBytes;
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use std::borrow::Cow;
 use std::collections::HashMap;
 
@@ -20,6 +21,9 @@ pub struct Rebuilt {
     pub leaves: usize,
     /// How many of them were taken over from the base.
     pub reused: usize,
+    /// Whether the base says of lights that have not changed what the scene does not give. Then
+    /// nothing of it was taken over.
+    pub base_contradicts: bool,
 }
 
 /// Builds the trees: one in its own space for each light that is shared, carried along or forced; one
@@ -35,7 +39,11 @@ pub fn build_tree(survey: &Survey) -> AlignedBytes {
 pub fn rebuild_tree<D: AsRef<[u8]>>(survey: &Survey, base: &LightTree<D>) -> Rebuilt {
     let lights = LightList::new(&survey.lights);
     let writer = LightTreeWriter::upon(Base::new(base, &lights));
-    write(survey, &lights, writer)
+    let rebuilt = write(survey, &lights, writer);
+    if !rebuilt.base_contradicts {
+        return rebuilt;
+    }
+    Rebuilt { base_contradicts: true, ..write(survey, &lights, LightTreeWriter::default()) }
 }
 
 fn write(survey: &Survey, lights: &LightList, writer: LightTreeWriter) -> Rebuilt {
@@ -54,14 +62,21 @@ fn write(survey: &Survey, lights: &LightList, writer: LightTreeWriter) -> Rebuil
         });
         builder.frames(survey, still, below, &forced_still);
     }
-    let writer = builder.writer;
-    let meta = serde_json::json!({
+    let mut writer = builder.writer;
+    for means in &survey.textures {
+        writer.add_texture(means.fingerprint, textures::rows(means));
+    }
+    let mut meta = serde_json::json!({
         "program": concat!("candelabra ", env!("CARGO_PKG_VERSION")),
         ALGORITHM: ALGORITHM_VERSION,
     });
+    if survey.origin != DVec3::ZERO {
+        meta[ORIGIN] = survey.origin.to_array().into();
+    }
     let (leaves, reused) = (writer.leaf_count(), writer.reused_leaf_count());
+    let base_contradicts = writer.base_contradicts();
     let bytes = writer.finish(lights, &meta.to_string(), survey.fingerprint);
-    Rebuilt { bytes, leaves, reused }
+    Rebuilt { bytes, leaves, reused, base_contradicts }
 }
 
 /// Under which name `META` has the version of the algorithm.
@@ -71,6 +86,16 @@ const ALGORITHM: &str = "algorithmVersion";
 pub(super) fn algorithm_of<D: AsRef<[u8]>>(tree: &LightTree<D>) -> Option<u32> {
     let meta: serde_json::Value = serde_json::from_str(tree.meta()).ok()?;
     meta[ALGORITHM].as_u64()?.try_into().ok()
+}
+
+/// Under which name `META` has the origin.
+const ORIGIN: &str = "origin";
+
+/// What is added to every position of a file to get that in the scene's world, metres.
+pub fn origin_of<D: AsRef<[u8]>>(tree: &LightTree<D>) -> DVec3 {
+    let meta: serde_json::Value = serde_json::from_str(tree.meta()).unwrap_or_default();
+    let origin = [0, 1, 2].map(|axis| meta[ORIGIN][axis].as_f64().unwrap_or(0.0));
+    DVec3::from(origin)
 }
 
 /// In its own space a light numbers its emitters from 0 on.
@@ -97,8 +122,9 @@ impl Builder<'_> {
         for (shared, mut users) in survey.shared.iter().zip(users) {
             users.sort_unstable();
             users.dedup();
-            let unchanged = (users.iter())
-                .find_map(|&light| self.writer.add_tree_of_base(light, trees_of[light]));
+            let unchanged = (users.iter()).find_map(|&light| {
+                self.writer.add_tree_of_base(light, trees_of[light], &shared.bounds)
+            });
             users.iter().for_each(|&light| trees_of[light] += 1);
             let tree = unchanged
                 .or_else(|| self.writer.add_tree(TreeKind::Shared, &shared.bounds, own))
@@ -186,7 +212,7 @@ fn stand_alike(a: &Group, b: &Group) -> bool {
 }
 
 /// The bounds of a tree in its own space as they are in world space, a little wider.
-fn in_world(own: &LightBounds, placed: &PlacedLight) -> LightBounds {
+pub(super) fn in_world(own: &LightBounds, placed: &PlacedLight) -> LightBounds {
     /// What rounding may turn an axis by, radians.
     const TURN: f32 = 1e-6;
     let to_local = placed.to_local.transform();

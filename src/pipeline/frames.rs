@@ -16,9 +16,11 @@ pub fn frames_of(scene: &Scene) -> Vec<i32> {
         let of_meshes = scene.instances.iter().filter_map(|instance| instance.values.as_ref());
         let values = of_lights.chain(of_meshes).map(|keys: &Keys<_>| keys.times_s.last());
         let last_s = seconds.chain(values).flatten().fold(0f32, |last, &key| last.max(key));
-        timeline.first_frame + f64::from(last_s) * timeline.frames_per_second
+        f64::from(last_s)
     };
-    let last = timeline.last_frame.unwrap_or_else(last_key);
+    let last_s = timeline.last_frame.map_or_else(last_key, |frame| timeline.seconds_at(frame));
+    // A 32-bit time a hair beyond a frame is that of the frame, and no reason for one more.
+    let last = timeline.frame_at(last_s);
     let first = timeline.first_frame.round() as i32;
     // A clock that runs for years is a slip of the exporter; let the user say what is meant.
     let last = (last.ceil() as i32).clamp(first, first.saturating_add(100_000));
@@ -40,8 +42,38 @@ pub(super) fn spell(frames: &[i32]) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::spell;
+    use super::{frames_of, spell};
     use crate::render::frames::Frames;
+    use crate::scene::{Channel, Interpolation, Keys, Node, Scene, Timeline, Trs};
+    use glam::Vec3;
+
+    #[test]
+    fn a_shot_ends_with_the_frame_of_its_last_key() {
+        for rate in [24.0, 24000.0 / 1001.0, 25.0, 30000.0 / 1001.0, 30.0, 60.0] {
+            for first_frame in [0.0, 1.0, 1001.0] {
+                for frames in (1..2000).chain([86_400, 99_999]) {
+                    let keys = Keys {
+                        times_s: vec![0.0, (f64::from(frames) / rate) as f32],
+                        values: vec![Vec3::ZERO, Vec3::ONE],
+                        interpolation: Interpolation::Linear,
+                    };
+                    let mut node = Node::fixed("/node", None, Trs::default());
+                    node.channels = vec![Channel::Scale(keys)];
+                    let timeline =
+                        Timeline { first_frame, frames_per_second: rate, last_frame: None };
+                    let mut scene = Scene { nodes: vec![node], timeline, ..Default::default() };
+                    let first = first_frame as i32;
+                    assert_eq!(frames_of(&scene).last(), Some(&(first + frames)), "{rate}");
+                    // Half a frame more is another frame; a hair more is none, as in a file's own words.
+                    for (more, last) in [(0.5, 1), (1e-6, 0)] {
+                        let end = f64::from(first + frames) + more;
+                        scene.timeline.last_frame = Some(end);
+                        assert_eq!(frames_of(&scene).last(), Some(&(first + frames + last)));
+                    }
+                }
+            }
+        }
+    }
 
     #[test]
     fn what_is_written_is_read() {

@@ -1,12 +1,13 @@
 //! Opening a tree file, and telling whether it still belongs to a scene.
 
+use super::agreement::{Contradiction, find_contradiction};
 use super::build::algorithm_of;
 use super::frames::spell;
 use super::{Survey, frames_of, survey};
 use crate::emitter::{Emitters, LightOverflow};
 use crate::light_tree::{ALGORITHM_VERSION, LightSummary, LightTree};
 use crate::scene::Scene;
-use crate::store::{self, Mmap, SectionId, StoreError};
+use crate::store::{self, Mmap, StoreError};
 use std::collections::BTreeMap;
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -40,6 +41,19 @@ pub enum TreeError {
         path: PathBuf,
         /// What changed.
         cause: StaleTree,
+    },
+    /// It says something of a light that the scene does not.
+    #[error(
+        "{}: contradicts the scene: {cause}. It keeps the rules of the format, but was not built from the scene as it is. Build it again: {remedy}",
+        path.display()
+    )]
+    Contradicts {
+        /// The file.
+        path: PathBuf,
+        /// What it says.
+        cause: Contradiction,
+        /// The command that builds it again, as a shell takes it.
+        remedy: String,
     },
     /// It was built by another version of the algorithm.
     #[error("{}: it was built by another version of the algorithm; build it again", path.display())]
@@ -131,31 +145,53 @@ impl std::error::Error for StaleTree {}
 
 /// Compares a tree with the scene it should belong to. `forced` are the paths that the user wants
 /// forced besides what the scene itself forces: part of the command that a stale tree is mended by.
+/// With `leaves`, each leaf is held against its emitter: the tree must have been verified.
 ///
 /// # Errors
 /// [`TreeError::Stale`] with the lights that changed, at most ten of them named in the message;
-/// [`TreeError::Broken`] if the tree's own list of lights contradicts its fingerprint.
-pub fn check_fresh<D: AsRef<[u8]>>(
+/// [`TreeError::Contradicts`] if the tree has the scene's fingerprint and says something else.
+pub fn check_fresh<D: AsRef<[u8]> + Sync>(
     tree: &LightTree<D>,
     path: &Path,
     scene: &Scene,
     emitters: &Emitters,
     forced: &[String],
+    leaves: bool,
 ) -> Result<(), TreeError> {
     let frames: Vec<i32> = tree.frames().iter().map(|row| row.frame).collect();
-    let Survey { lights, fingerprint, .. } = survey(scene, emitters, &frames)?;
-    if fingerprint != tree.fingerprint() {
+    let survey = survey(scene, emitters, &frames)?;
+    if survey.fingerprint != tree.fingerprint() {
         let remedy = build_command(scene, path, &frames, forced);
-        return Err(TreeError::Stale { path: path.into(), cause: compare(tree, &lights, remedy) });
+        let cause = compare(tree, &survey.lights, remedy);
+        return Err(TreeError::Stale { path: path.into(), cause });
     }
-    // Nobody may have verified the tree: its list of lights is not under the header's checksum.
-    let told = tree.lights().iter().map(|row| (row.first_emitter, row.emitter_count, row.class));
-    let known = emitters.lights().iter().zip(&lights);
-    if told.eq(known.map(|(light, summary)| (light.first, light.count, summary.class))) {
+    check_agreement(tree, path, scene, &survey, forced, leaves)
+}
+
+/// Refuses a tree that has the fingerprint of a survey and says something else than the survey. What
+/// is of another content is let pass.
+///
+/// # Errors
+/// [`TreeError::Contradicts`].
+pub fn check_agreement<D: AsRef<[u8]> + Sync>(
+    tree: &LightTree<D>,
+    path: &Path,
+    scene: &Scene,
+    survey: &Survey,
+    forced: &[String],
+    leaves: bool,
+) -> Result<(), TreeError> {
+    if survey.fingerprint != tree.fingerprint() {
         return Ok(());
     }
-    let cause = StoreError::Checksum { section: Some(SectionId(*b"LGHT")) };
-    Err(TreeError::Broken { path: path.into(), cause })
+    match find_contradiction(tree, survey, leaves) {
+        None => Ok(()),
+        Some(cause) => {
+            let frames: Vec<i32> = tree.frames().iter().map(|row| row.frame).collect();
+            let remedy = build_command(scene, path, &frames, forced);
+            Err(TreeError::Contradicts { path: path.into(), cause, remedy })
+        }
+    }
 }
 
 /// The command that builds a tree again for the frames that it was built for.

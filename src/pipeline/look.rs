@@ -1,18 +1,10 @@
 //! What lights look like, for people who compare tree files.
 
-use super::Survey;
 use crate::emitter::{LightSource, PosedEmitters};
-use crate::light_tree::{LightLook, LightTree};
+use crate::light_tree::LightLook;
 use crate::math::color::Rgb;
 use crate::scene::{LightKind, Scene};
 use rayon::prelude::*;
-
-/// Whether a tree was built from what a survey found, down to what the lights look like.
-pub fn is_built_from<D: AsRef<[u8]>>(tree: &LightTree<D>, survey: &Survey) -> bool {
-    let told = tree.lights().iter().map(|row| row.look);
-    tree.fingerprint() == survey.fingerprint
-        && told.eq(survey.lights.iter().map(|light| light.look))
-}
 
 /// The looks of all lights in a pose, in their order.
 pub(super) fn looks(posed: &PosedEmitters) -> Vec<LightLook> {

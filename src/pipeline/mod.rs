@@ -1,9 +1,11 @@
 //! Floor 5: jobs, the only place where ingest meets the tree.
 //!
-//! [`load_scene`] reads a scene; [`survey()`] finds out what its tree depends on; [`build_tree`] builds
-//! the trees of a shot; [`check_fresh`] tells whether a tree still belongs to a scene, and if not,
-//! which lights changed. [`look()`] finds the camera that a user means, and makes one where there is none.
+//! [`load_scene`] reads a scene; [`collect_emitters`] finds what shines in it; [`survey()`] finds out
+//! what its tree depends on; [`build_tree`] builds the trees of a shot; [`check_fresh`] tells whether
+//! a tree still belongs to a scene, and if not, which lights changed. [`look()`] finds
+//! the camera that a user means, and makes one where there is none.
 
+mod agreement;
 mod build;
 mod content;
 mod fit;
@@ -14,18 +16,21 @@ mod look;
 pub mod option;
 mod rig;
 mod survey;
+mod textures;
 mod view;
 
-pub use build::{Rebuilt, build_tree, rebuild_tree};
+pub use agreement::{Contradiction, Standing, standing};
+pub use build::{Rebuilt, build_tree, origin_of, rebuild_tree};
 pub use content::scene_fingerprint;
 pub use forced::{NoLightThere, force_lights};
 pub use frames::frames_of;
 pub use fresh::{
-    OpenedTree, StaleTree, TreeError, check_fresh, is_tree_file, open_base, open_tree,
+    OpenedTree, StaleTree, TreeError, check_agreement, check_fresh, is_tree_file, open_base,
+    open_tree,
 };
-pub use look::is_built_from;
 pub use rig::carry_camera;
 pub use survey::{Group, PlacedLight, SharedBounds, Survey, survey};
+pub use textures::collect_emitters;
 pub use view::{ASPECT, Look, View, ViewError, look};
 
 use crate::ingest::{self, IngestError};

@@ -2,10 +2,13 @@
 
 use super::look::looks;
 use crate::bounds::LightBounds;
-use crate::emitter::{Emitters, LightEntry, LightOverflow, LightSource, PosedEmitters};
+use crate::emitter::{
+    Emitters, LightEntry, LightOverflow, LightSource, PosedEmitters, TextureMeans,
+};
 use crate::light_tree::{ALGORITHM_VERSION, LightLook, LightRow, LightSummary};
 use crate::math::Similarity;
-use crate::scene::{Pose, Scene};
+use crate::scene::{Pose, Posing, Scene};
+use glam::DVec3;
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -17,8 +20,12 @@ pub struct Survey {
     pub still: Group,
     /// What changes, frame by frame; empty if nothing does.
     pub frames: Vec<(i32, Group)>,
+    /// Where the origin of all these bounds is in the scene's world, metres.
+    pub origin: DVec3,
     /// What the file says of each light.
     pub lights: Vec<LightSummary>,
+    /// What emission textures give, by ascending fingerprint. The bounds above follow from it.
+    pub textures: Vec<TextureMeans>,
     /// Of all of the above, and of the algorithm that builds over it.
     pub fingerprint: [u8; 32],
 }
@@ -64,29 +71,28 @@ pub struct PlacedLight {
 /// # Errors
 /// A light that is too far away or too strong for `f32`.
 pub fn survey(scene: &Scene, emitters: &Emitters, frames: &[i32]) -> Result<Survey, LightOverflow> {
-    let mut surveyor = Surveyor { scene, emitters, shared: Vec::new(), own: Vec::new() };
-    surveyor.own = vec![None; emitters.mesh_lights().len()];
+    let own = vec![None; emitters.mesh_lights().len()];
+    let mut surveyor = Surveyor { scene, emitters, shared: Vec::new(), own };
+    let (changing, still): (Vec<u32>, Vec<u32>) = (0..emitters.lights().len() as u32)
+        .partition(|&row| emitters.lights()[row as usize].changes());
+    let mut posing = Posing::new(scene);
     let pose = scene.pose_at(0.0);
-    let still = surveyor.group(&pose, false)?;
-    let any_changes = emitters.lights().iter().any(LightEntry::changes);
-    let frames = if any_changes { frames } else { &[] }
+    let still = surveyor.group(&pose, &still)?;
+    let frames = if changing.is_empty() { &[] } else { frames };
+    let frames = frames
         .iter()
-        .map(|&frame| {
-            let pose = scene.pose_at(scene.timeline.seconds_at(f64::from(frame)));
-            Ok((frame, surveyor.group(&pose, true)?))
-        })
+        .map(|&frame| Ok((frame, surveyor.group(posing.at_frame(frame), &changing)?)))
         .collect::<Result<Vec<_>, LightOverflow>>()?;
     let shared = surveyor.shared;
     check_total(emitters, &shared, &still, &frames)?;
     // What changes looks as it does in the first frame.
-    let pose = match frames.first() {
-        Some((frame, _)) => scene.pose_at(scene.timeline.seconds_at(f64::from(*frame))),
-        None => pose,
-    };
-    let looks = looks(&PosedEmitters { scene, emitters, pose: &pose });
-    let lights = summaries(emitters, &looks, &shared, &still, &frames);
+    let pose = frames.first().map_or(&pose, |(frame, _)| posing.at_frame(*frame));
+    let looks = looks(&PosedEmitters { scene, emitters, pose });
+    let lights = summaries(scene, emitters, &looks, &shared, &still, &frames);
     let fingerprint = whole(&lights, &frames);
-    Ok(Survey { shared, still, frames, lights, fingerprint })
+    let textures = emitters.texture_means().to_vec();
+    let origin = scene.origin;
+    Ok(Survey { shared, still, frames, origin, lights, textures, fingerprint })
 }
 
 struct Surveyor<'a> {
@@ -98,17 +104,15 @@ struct Surveyor<'a> {
 }
 
 impl Surveyor<'_> {
-    /// The lights that stand still, or those that change.
-    fn group(&mut self, pose: &Pose, changing: bool) -> Result<Group, LightOverflow> {
+    /// Some lights, by rows in ascending order: those that stand still, or those that change.
+    fn group(&mut self, pose: &Pose, rows: &[u32]) -> Result<Group, LightOverflow> {
         let Surveyor { scene, emitters, .. } = *self;
         let posed = PosedEmitters { scene, emitters, pose };
         let mut flat: Option<Range<u32>> = None;
         let mut group = Group::default();
-        for (row, light) in (0..).zip(emitters.lights()) {
+        for &row in rows {
+            let light = &emitters.lights()[row as usize];
             let of_light = light.first..light.first + light.count;
-            if light.changes() != changing {
-                continue;
-            }
             if light.in_own_space || light.forced {
                 let placed = self.place(&posed, row, light)?;
                 if light.forced { &mut group.forced } else { &mut group.placed }.push(placed);
@@ -198,6 +202,7 @@ fn check_total(
 }
 
 fn summaries(
+    scene: &Scene,
     emitters: &Emitters,
     looks: &[LightLook],
     shared: &[SharedBounds],
@@ -217,6 +222,9 @@ fn summaries(
             false => vec![still],
         };
         let mut hasher = blake3::Hasher::new();
+        if scene.origin != DVec3::ZERO {
+            hasher.update(bytemuck::bytes_of(&scene.origin));
+        }
         let mut energy = None;
         for group in groups {
             let now = match placed_of(group, row as u32) {

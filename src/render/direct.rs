@@ -18,6 +18,8 @@ pub struct Incoming {
     pub pdf: Option<f32>,
     /// Where it comes from; `None` from infinity.
     pub from: Option<Anchor>,
+    /// Whether a reflected ray in its direction would find it, too.
+    pub is_seen: bool,
 }
 
 impl Integrator<'_> {
@@ -32,7 +34,7 @@ impl Integrator<'_> {
         scratch: &mut PathScratch,
     ) -> Rgb {
         let mut sum = Rgb::ZERO;
-        let PathScratch { picks, stats } = scratch;
+        let PathScratch { picks, stats, .. } = scratch;
         let several = self.picker.takes_several();
         self.picker.pick(wanted, u_pick, salt, picks, |pick| {
             stats.light_picks += 1;
@@ -62,8 +64,10 @@ impl Integrator<'_> {
             None => reflected * incoming.radiance / probability,
             Some(pdf) => {
                 let expected = pick.expected as f32 * pdf;
-                let weight =
-                    if self.settings.mis { power_heuristic(expected, bsdf_pdf) } else { 1.0 };
+                let weight = match self.settings.mis && incoming.is_seen {
+                    true => power_heuristic(expected, bsdf_pdf),
+                    false => 1.0,
+                };
                 reflected * incoming.radiance * (weight / (probability * pdf))
             }
         }
@@ -75,9 +79,11 @@ impl Integrator<'_> {
         let emitter = match light {
             Picked::Emitter(emitter) => emitter,
             Picked::Beside(row) => {
-                let s = self.infinite[row as usize].sample(normal, u)?;
+                let light = &self.infinite[row as usize];
+                let s = light.sample(normal, u)?;
                 let (direction, radiance, pdf) = (s.direction, s.radiance, s.pdf);
-                return Some(Incoming { direction, radiance, pdf, from: None });
+                let is_seen = light.visibility.reflections;
+                return Some(Incoming { direction, radiance, pdf, from: None, is_seen });
             }
         };
         let s = self.emitters.sample(emitter, point, u)?;
@@ -94,6 +100,7 @@ impl Integrator<'_> {
             radiance: s.radiance * coverage,
             pdf: s.pdf,
             from: Some(from),
+            is_seen: s.is_seen,
         })
     }
 

@@ -1,14 +1,17 @@
 //! Homogeneous fog, once scattered.
 //!
-//! Along every stretch of a path lights are picked for the whole stretch (seed, "Extending to volume
-//! render"); for each a point of the stretch is drawn by the angle under which the light sees it
-//! (Kulla and Fajardo 2012, "Importance Sampling Techniques for Path Tracing in Participating Media",
-//! section 4), which cancels the pole of `1/d^2`, and only where the light can shine, which a narrow
-//! beam does on a short part; and from there light is taken as from any point. A
-//! light at infinity sees nothing under an angle: for it, points are drawn by what the fog lets
-//! through. Light that is scattered twice is left out.
+//! Lights are picked for every stretch of a path as a whole (seed, "Extending to volume render"). For
+//! each light a point of the stretch is drawn by the angle under which the light sees it (Kulla and
+//! Fajardo 2012, "Importance Sampling Techniques for Path Tracing in Participating Media", section 4),
+//! which cancels the pole of `1/d^2`. It is drawn only where the light can shine: a narrow beam does so
+//! on a short part. From that point light is taken as from any other. An infinite light sees nothing
+//! under an angle; its points are drawn by what the fog lets through. Light that is scattered twice is
+//! left out.
 //!
 //! Fog that has no box fills the one around everything in the scene, so that suns and domes reach it.
+//!
+//! Places along a ray are in double precision, and a point is rounded once: a beam of a millimetre is
+//! found from kilometres away.
 
 use super::direct::another;
 use super::path::{Integrator, PathScratch};
@@ -17,7 +20,7 @@ use super::rays::Anchor;
 use crate::light_tree::{Picked, Segment};
 use crate::math::color::{Rgb, luminance};
 use crate::scene::{Camera, Medium, Pose, Scene};
-use glam::{Affine3A, Vec2, Vec3};
+use glam::{DAffine3, DVec3, Vec2, Vec3};
 use std::f32::consts::PI;
 
 /// Fog in one pose.
@@ -29,9 +32,27 @@ pub struct Fog {
     extinction: Rgb,
     anisotropy: f32,
     /// World space to the space of its box.
-    to_box: Affine3A,
-    min: Vec3,
-    max: Vec3,
+    to_box: DAffine3,
+    min: DVec3,
+    max: DVec3,
+}
+
+/// A part of a ray. World space, metres.
+#[derive(Clone, Copy, Debug)]
+struct Stretch {
+    origin: DVec3,
+    direction: DVec3,
+    length: f64,
+}
+
+impl Stretch {
+    fn at(&self, t: f64) -> DVec3 {
+        self.origin + t * self.direction
+    }
+
+    fn part(&self, (from, to): (f64, f64)) -> Stretch {
+        Stretch { origin: self.at(from), length: to - from, ..*self }
+    }
 }
 
 impl Fog {
@@ -39,101 +60,112 @@ impl Fog {
     pub fn new(scene: &Scene, pose: &Pose, camera: &Camera) -> Option<Fog> {
         let Medium { scattering, absorption, anisotropy, region } = scene.medium.as_ref()?.clone();
         let (to_box, min, max) = match region {
-            Some(region) => (pose.world(region.node).inverse(), region.min, region.max),
+            Some(region) => {
+                let world = pose.world(region.node);
+                let translation = Vec3::from(world.translation).as_dvec3();
+                let to_world = DAffine3 { matrix3: world.matrix3.as_dmat3(), translation };
+                (to_world.inverse(), region.min, region.max)
+            }
             None => {
                 let (min, max) = around_everything(scene, pose, camera);
-                (Affine3A::IDENTITY, min, max)
+                (DAffine3::IDENTITY, min, max)
             }
         };
+        let (min, max) = (min.as_dvec3(), max.as_dvec3());
         let extinction = scattering + absorption;
         let is_there = to_box.is_finite() && extinction.max_element() > 0.0;
         is_there.then_some(Fog { scattering, extinction, anisotropy, to_box, min, max })
     }
 
     /// Where a ray is inside, between 0 and a length, metres.
-    fn inside(&self, origin: Vec3, direction: Vec3, length: f32) -> Option<(f32, f32)> {
-        let o = self.to_box.transform_point3(origin);
-        let d = self.to_box.transform_vector3(direction);
-        let (mut from, mut to) = (0f32, length);
+    fn inside(&self, stretch: &Stretch) -> Option<(f64, f64)> {
+        let o = self.to_box.transform_point3(stretch.origin);
+        let d = self.to_box.transform_vector3(stretch.direction);
+        let (mut from, mut to) = (0.0, stretch.length);
         for axis in 0..3 {
-            let (a, b) =
-                ((self.min[axis] - o[axis]) / d[axis], (self.max[axis] - o[axis]) / d[axis]);
-            // In the plane of a face, both are infinite or not numbers: then the side decides.
+            // In the plane of a face both are infinite or not numbers: then the side decides.
             if d[axis] == 0.0 {
                 if o[axis] < self.min[axis] || o[axis] > self.max[axis] {
                     return None;
                 }
                 continue;
             }
-            from = from.max(a.min(b));
-            to = to.min(a.max(b));
+            let [a, b] = [self.min, self.max].map(|side| (side[axis] - o[axis]) / d[axis]);
+            from = a.min(b).max(from);
+            to = a.max(b).min(to);
         }
         (from < to).then_some((from, to))
     }
 
     /// The share of light that a stretch lets through.
     pub fn transmittance(&self, origin: Vec3, direction: Vec3, length: f32) -> Rgb {
-        match self.inside(origin, direction, length) {
+        match self.inside(&stretch(origin, direction, length)) {
             Some((from, to)) => self.through(to - from),
             None => Rgb::ONE,
         }
     }
 
-    fn through(&self, metres: f32) -> Rgb {
-        (-self.extinction * metres).exp()
+    fn through(&self, metres: f64) -> Rgb {
+        (self.extinction.as_dvec3() * -metres).exp().as_vec3()
     }
 
-    /// Henyey and Greenstein's phase function, 1/sr, of the cosine by which light is turned.
-    fn phase(&self, cosine: f32) -> f32 {
+    /// Henyey and Greenstein's phase function, 1/sr, of light that comes from one direction and goes
+    /// on against the other; both are unit.
+    fn phase(&self, toward_light: Vec3, ray: Vec3) -> f32 {
         let g = self.anisotropy;
-        let base = (1.0 + g * g - 2.0 * g * cosine).max(1e-7);
-        (1.0 - g * g) / (4.0 * PI * base * base.sqrt())
+        // 1 + g^2 - 2 g cos, by the chord between the directions: at the peak of a narrow lobe the
+        // sum itself is rounding.
+        let peak = if g < 0.0 { toward_light + ray } else { toward_light - ray };
+        let base = (1.0 - g.abs()).powi(2) + g.abs() * peak.length_squared();
+        (1.0 - g.abs()) * (1.0 + g.abs()) / (4.0 * PI * base * base.sqrt())
     }
+}
+
+fn stretch(origin: Vec3, direction: Vec3, length: f32) -> Stretch {
+    let (origin, direction) = (origin.as_dvec3(), direction.as_dvec3());
+    Stretch { origin, direction, length: length.into() }
 }
 
 /// A place on a stretch.
 struct Drawn {
     /// Metres from its begin.
-    t: f32,
+    t: f64,
     /// 1/m.
-    pdf: f32,
+    pdf: f64,
 }
 
 /// A place by the angle under which a point sees it.
-fn by_angle(segment: &Segment, seen_from: Vec3, u: f32) -> Option<Drawn> {
-    let to_point = seen_from - segment.origin;
-    let nearest = to_point.dot(segment.direction);
-    let off = (to_point - nearest * segment.direction).length();
+fn by_angle(stretch: &Stretch, seen_from: DVec3, u: f64) -> Option<Drawn> {
+    let to_point = seen_from - stretch.origin;
+    let nearest = to_point.dot(stretch.direction);
+    let off = (to_point - nearest * stretch.direction).length();
     // On the line itself every angle is the same: keep a little off it.
-    let off = off.max(1e-5 * segment.length).max(f32::MIN_POSITIVE);
-    // From there to the begin and to the end, along the line. The angle between them is no difference
-    // of two large ones, nor is the place: seen from far away, both would be mostly rounding.
-    let (begin, end) = (-nearest, segment.length - nearest);
-    let angle = (segment.length * off).atan2(off * off + begin * end);
+    let off = off.max(1e-5 * stretch.length).max(f64::MIN_POSITIVE);
+    // From there to the begin and to the end, along the line. Neither the angle between them nor the
+    // place is a difference of large numbers, which would be rounding from far away.
+    let (begin, end) = (-nearest, stretch.length - nearest);
+    let angle = (stretch.length * off).atan2(off * off + begin * end);
     let (sin, cos) = (u * angle).sin_cos();
     let reach2 = off * off + begin * begin;
-    let t = (sin * reach2 / (off * cos - begin * sin)).clamp(0.0, segment.length);
+    let t = (sin * reach2 / (off * cos - begin * sin)).clamp(0.0, stretch.length);
     let pdf = off / (angle * (off * off + (begin + t).powi(2)));
     (pdf.is_finite() && pdf > 0.0).then_some(Drawn { t, pdf })
 }
 
 /// A place by what the fog lets through.
-fn by_transmittance(length: f32, extinction: f32, u: f32) -> Drawn {
+fn by_transmittance(length: f64, extinction: f64, u: f64) -> Drawn {
     let lost = -(-extinction * length).exp_m1();
-    if lost < 1e-4 {
-        return Drawn { t: u * length, pdf: 1.0 / length };
-    }
     let t = (-(-u * lost).ln_1p() / extinction).min(length);
     Drawn { t, pdf: extinction * (-extinction * t).exp() / lost }
 }
 
 impl Integrator<'_> {
     /// A place where an emitter may shine, by the angle under which it sees it.
-    fn by_angle_of(&self, emitter: u32, segment: &Segment, u: f32) -> Option<Drawn> {
-        let Segment { origin, direction, length } = *segment;
+    fn by_angle_of(&self, emitter: u32, stretch: &Stretch, u: f64) -> Option<Drawn> {
+        let Stretch { origin, direction, length } = *stretch;
         let (from, to) = self.emitters.lit_part(emitter, origin, direction, length)?;
-        let lit = Segment { origin: origin + from * direction, direction, length: to - from };
-        let drawn = by_angle(&lit, self.emitters.middle(emitter), u)?;
+        let middle = self.emitters.middle(emitter).as_dvec3();
+        let drawn = by_angle(&stretch.part((from, to)), middle, u)?;
         Some(Drawn { t: from + drawn.t, ..drawn })
     }
 
@@ -146,29 +178,33 @@ impl Integrator<'_> {
         accept: &impl Fn(u32, u32, Vec2) -> bool,
         scratch: &mut PathScratch,
     ) -> Rgb {
-        let Some((from, to)) = fog.inside(origin, direction, length) else { return Rgb::ZERO };
-        let segment = Segment { origin: origin + from * direction, direction, length: to - from };
-        let extinction = luminance(fog.extinction).max(f32::MIN_POSITIVE);
-        let lost = -(-extinction * segment.length).exp_m1();
-        let wanted = Wanted::Along(segment, lost / extinction);
+        let whole = stretch(origin, direction, length);
+        let Some(part) = fog.inside(&whole) else { return Rgb::ZERO };
+        let stretch = whole.part(part);
+        let extinction = f64::from(luminance(fog.extinction).max(f32::MIN_POSITIVE));
+        let lost = -(-extinction * stretch.length).exp_m1();
+        let (origin, length) = (stretch.origin.as_vec3(), stretch.length as f32);
+        let segment = Segment { origin, direction, length };
+        let wanted = Wanted::Along(segment, (lost / extinction) as f32);
         let mut sum = Rgb::ZERO;
-        let PathScratch { picks, stats } = scratch;
+        let PathScratch { picks, stats, .. } = scratch;
         self.picker.pick(&wanted, u_pick, salt, picks, |pick| {
             stats.light_picks += 1;
-            let place = another(Vec2::new(u_place, 0.0), salt, pick.light).x;
+            let place = f64::from(another(Vec2::new(u_place, 0.0), salt, pick.light).x);
             let drawn = match pick.light {
-                Picked::Emitter(emitter) => self.by_angle_of(emitter, &segment, place),
-                Picked::Beside(_) => Some(by_transmittance(segment.length, extinction, place)),
+                Picked::Emitter(emitter) => self.by_angle_of(emitter, &stretch, place),
+                Picked::Beside(_) => Some(by_transmittance(stretch.length, extinction, place)),
             };
             let Some(Drawn { t, pdf }) = drawn else { return };
-            let point = segment.origin + t * direction;
+            let point = stretch.at(t).as_vec3();
             let u = another(Vec2::new(lu, lv), !salt, pick.light);
             let Some(light) = self.incoming(pick.light, point, Vec3::ZERO, u) else { return };
             stats.rays += 1;
             let arriving = self.arriving(&Anchor::free(point), &light, accept);
-            let turned = fog.phase(light.direction.dot(direction));
-            let density = pick.probability as f32 * pdf * light.pdf.unwrap_or(1.0);
-            sum += fog.scattering * fog.through(t) * arriving * light.radiance * (turned / density);
+            let turned = f64::from(fog.phase(light.direction, direction));
+            let density = pick.probability * pdf * f64::from(light.pdf.unwrap_or(1.0));
+            let weight = (turned / density) as f32;
+            sum += fog.scattering * fog.through(t) * arriving * light.radiance * weight;
         });
         sum
     }
@@ -197,4 +233,76 @@ fn around_everything(scene: &Scene, pose: &Pose, camera: &Camera) -> (Vec3, Vec3
         add(pose.world(node).translation.into());
     }
     (min, max)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn fog(scattering: f32, anisotropy: f32, to_box: DAffine3) -> Fog {
+        let scattering = Rgb::splat(scattering);
+        let (min, max) = (DVec3::ZERO, DVec3::ONE);
+        Fog { scattering, extinction: scattering, anisotropy, to_box, min, max }
+    }
+
+    proptest! {
+        /// Of lobes as narrow as 32 bits can say, forwards and backwards.
+        #[test]
+        fn the_phase_function_scatters_all_light(sharp in -7.0..0.0, backward in any::<bool>()) {
+            let g = 1.0 - 10f64.powf(sharp) as f32;
+            let fog = fog(1.0, if backward { -g } else { g }, DAffine3::IDENTITY);
+            // Steps that grow with the angle off the peak, from far inside the lobe.
+            let (n, least) = (4000, 1e-9f64);
+            let ratio = (std::f64::consts::PI / least).powf(1.0 / f64::from(n));
+            let sum: f64 = (0..n).map(|i| least * ratio.powf(f64::from(i) + 0.5)).map(|theta| {
+                let (sin, cos) = theta.sin_cos();
+                let side = if backward { -1.0 } else { 1.0 };
+                let toward = Vec3::new(sin as f32, 0.0, (side * cos) as f32);
+                let width = theta * (ratio.sqrt() - 1.0 / ratio.sqrt());
+                f64::from(fog.phase(toward, Vec3::Z)) * sin * width * std::f64::consts::TAU
+            }).sum();
+            prop_assert!((sum - 1.0).abs() < 1e-3, "{sum} for {g}");
+        }
+
+        /// A box of any size, seen from any distance.
+        #[test]
+        fn a_far_box_keeps_its_thickness(away in -9.0..9.0, size in -9.0..9.0, depth in -3.0..1.0) {
+            let (size, away) = (10f64.powf(size), 10f64.powf(away));
+            let extinction = (10f64.powf(depth) / size) as f32;
+            let fog = fog(extinction, 0.0, DAffine3::from_scale(DVec3::splat(1.0 / size)));
+            let origin = Vec3::new((0.5 * size) as f32, (0.5 * size) as f32, -away as f32);
+            let through = fog.transmittance(origin, Vec3::Z, f32::INFINITY).x;
+            let expected = (-f64::from(extinction) * size).exp();
+            prop_assert!((f64::from(through) - expected).abs() < 1e-6 + 1e-15 * away / size);
+        }
+
+        /// The density is that of the places, which are all of the stretch.
+        #[test]
+        fn places_have_the_density_they_tell(
+            length in -9.0..9.0, off in -9.0..9.0, along in -9.0..9.0, depth in -9.0..3.0,
+            is_behind in any::<bool>()
+        ) {
+            let [length, off, along] = [length, off, along].map(|e| 10f64.powf(e));
+            let along = if is_behind { -along } else { along };
+            let stretch = Stretch { origin: DVec3::ZERO, direction: DVec3::X, length };
+            let by_angle = |u| by_angle(&stretch, DVec3::new(along, off, 0.0), u);
+            let by_loss = |u| Some(by_transmittance(length, 10f64.powf(depth) / length, u));
+            let draws: [&dyn Fn(f64) -> Option<Drawn>; 2] = [&by_angle, &by_loss];
+            for draw in draws {
+                for i in 0..64 {
+                    let u = (f64::from(i) + 0.5) / 64.0;
+                    let [before, here, after] = [u - 1e-5, u, u + 1e-5].map(|u| draw(u).unwrap());
+                    let rate = (after.t - before.t) / 2e-5;
+                    let noise = 1e-15 * length / 1e-5 / rate;
+                    let product = here.pdf * rate;
+                    prop_assert!((product - 1.0).abs() < 1e-3 + noise, "{product} at {u}");
+                    prop_assert!((0.0..=length).contains(&here.t));
+                }
+                prop_assert!(draw(0.0).unwrap().t <= 1e-12 * length);
+                // Of what no light gets through, the far end is never met.
+                prop_assert!(draw(1.0).unwrap().t >= (1.0 - 1e-9) * length || depth > 0.5);
+            }
+        }
+    }
 }

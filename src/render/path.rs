@@ -11,13 +11,14 @@ use super::camera::{CameraRay, CameraRays};
 use super::direct::power_heuristic;
 use super::fog::Fog;
 use super::picker::{LightPicker, PickScratch, Wanted};
-use super::rays::{Anchor, Hit, HitSurface, Tracer};
+use super::rays::{Anchor, Hit, HitSurface, Seen, SeenLight, Sender, Tracer};
 use super::settings::RenderSettings;
 use super::surface::Surfaces;
 use crate::emitter::{EmitterHit, InfiniteLight, PosedEmitters};
 use crate::light_tree::{Glossy, Lobes, Picked, Receiver};
 use crate::math::color::Rgb;
 use crate::math::random::{Sampler, hash};
+use crate::scene::Visibility;
 use glam::{Vec2, Vec3};
 
 /// Bounces after which a path may be ended by chance.
@@ -101,6 +102,7 @@ pub struct Vertex {
 #[derive(Debug, Default)]
 pub struct PathScratch {
     pub(super) picks: PickScratch,
+    lights: Vec<SeenLight>,
     /// What it cost so far.
     pub stats: TraceStats,
 }
@@ -125,7 +127,10 @@ impl Integrator<'_> {
         let mut before: Option<Origin> = None;
         for bounce in 0..=self.settings.depth {
             scratch.stats.rays += 1;
-            let hit = self.tracer.closest(origin, direction, reach_m, &accept);
+            let sender = if bounce == 0 { Sender::Camera } else { Sender::Surface };
+            let mut lights = std::mem::take(&mut scratch.lights);
+            let ray = (origin, direction, reach_m);
+            let Seen { hit, in_shade } = self.tracer.look(sender, ray, &accept, &mut lights);
             reach_m = f32::INFINITY;
             if let Some(fog) = &self.fog {
                 let length = hit.as_ref().map_or(f32::INFINITY, |hit| hit.t);
@@ -135,13 +140,21 @@ impl Integrator<'_> {
                     let light = self.scattered(fog, stretch, (numbers, salt), &accept, scratch);
                     seen.radiance += throughput * light;
                 }
-                throughput *= fog.transmittance(origin, direction, length);
             }
+            for SeenLight { hit, .. } in &lights {
+                let arriving = throughput * self.through_fog(origin, direction, hit.t);
+                seen.radiance += arriving * self.emitted(hit, direction, &before, scratch);
+            }
+            scratch.lights = lights;
+            let length = hit.as_ref().map_or(f32::INFINITY, |hit| hit.t);
+            throughput *= self.through_fog(origin, direction, length);
             let Some(hit) = hit else {
-                seen.radiance += throughput * self.emitted_at_infinity(direction, &before, scratch);
+                if !in_shade {
+                    let light = self.emitted_at_infinity(direction, &before, scratch);
+                    seen.radiance += throughput * light;
+                }
                 break;
             };
-            seen.radiance += throughput * self.emitted(&hit, direction, &before, scratch);
             let wo = -direction;
             let vertex = self.vertex(&hit, wo);
             if bounce == 0 {
@@ -199,11 +212,12 @@ impl Integrator<'_> {
         let CameraRay { mut origin, mut direction, mut reach_m } =
             self.camera.ray(x, y, Vec2::new(px, py), Vec2::new(lx, ly));
         let accept = self.cutouts(seed);
+        let mut lights = Vec::new();
         let mut last = None;
-        for _ in 0..=bounces {
-            let Some(hit) = self.tracer.closest(origin, direction, reach_m, &accept) else {
-                break;
-            };
+        for bounce in 0..=bounces {
+            let sender = if bounce == 0 { Sender::Camera } else { Sender::Surface };
+            let ray = (origin, direction, reach_m);
+            let Some(hit) = self.tracer.look(sender, ray, &accept, &mut lights).hit else { break };
             reach_m = f32::INFINITY;
             let Some(vertex) = self.vertex(&hit, -direction) else { break };
             let [lobe, bu, bv, _] = sampler.next_4d();
@@ -236,7 +250,13 @@ impl Integrator<'_> {
         }
     }
 
-    /// Light that a ray finds where it ends, weighed against having picked it.
+    /// The share of light that fog lets through along a stretch of a ray.
+    fn through_fog(&self, origin: Vec3, direction: Vec3, length: f32) -> Rgb {
+        let through = |fog: &Fog| fog.transmittance(origin, direction, length);
+        self.fog.as_ref().map_or(Rgb::ONE, through)
+    }
+
+    /// Light that a ray finds at a hit, weighed against having picked it.
     fn emitted(
         &self,
         hit: &Hit,
@@ -282,7 +302,9 @@ impl Integrator<'_> {
     ) -> Rgb {
         let mut sum = Rgb::ZERO;
         for (row, light) in self.infinite.iter().enumerate() {
-            let radiance = light.radiance(direction);
+            let Visibility { camera, reflections, .. } = light.visibility;
+            let meets = if before.is_none() { camera } else { reflections };
+            let radiance = if meets { light.radiance(direction) } else { Rgb::ZERO };
             if radiance == Rgb::ZERO {
                 continue;
             }

@@ -4,20 +4,22 @@
 //! vertex colour) and the mesh's attributes at a point of a triangle; it does not trace, and what a
 //! surface emits is not its affair but that of the light that the mesh is.
 //!
-//! Sides. The geometric normal of a hit is the front's. Reflection is two-sided, so the shading
-//! frame is turned to the side that `wo` is on. Normals of a file that point against the winding are turned, missing
-//! ones are the triangle's own, and one that a normal map or interpolation bends away from `wo`
-//! is bent back until `wo` is above its horizon.
+//! Sides. The geometric normal of a hit is the front's. Reflection is two-sided, so the shading frame
+//! is turned to the side that `wo` is on. A normal of the file that points against the winding is
+//! turned. Where the file has none, the triangle's own counts. A normal that a normal map or
+//! interpolation bends away from `wo` is bent back until `wo` is above its horizon, but no farther than
+//! the triangle itself stands: a flat surface is never bent, however grazing `wo` is.
 
 use super::bsdf::{Bsdf, SurfaceSample};
 use super::rays::Anchor;
 use crate::math::Frame;
 use crate::math::color::Rgb;
+use crate::math::directions::mirrors;
 use crate::scene::{AlphaMode, Material, Mesh, Pose, Scene, TextureUse};
-use glam::{Mat3, Vec2, Vec3, Vec4};
+use glam::{Affine3A, DMat3, DVec3, Vec2, Vec3, Vec4};
 use std::ops::{Add, Mul};
 
-/// The smallest cosine between `wo` and the shading normal.
+/// The smallest cosine between `wo` and a shading normal that is not the triangle's own.
 const LEAST_COSINE: f32 = 1e-3;
 
 /// Looks up what is at a hit, for one pose of a scene.
@@ -90,9 +92,9 @@ impl<'a> Surfaces<'a> {
         let (at, material) = self.locate(instance, triangle, barycentric);
         let front = anchor.normal.dot(wo) >= 0.0;
         let node = self.scene.instances[instance as usize].node;
-        let to_world = Mat3::from(self.pose.world(node).matrix3);
-        let normal = self.shading_normal(&at, material, to_world, anchor.normal);
-        let normal = toward(if front { normal } else { -normal }, wo);
+        let normal = self.shading_normal(&at, material, &self.pose.world(node), anchor.normal);
+        let least = anchor.normal.dot(wo).abs().min(LEAST_COSINE);
+        let normal = toward(if front { normal } else { -normal }, wo, least);
         let frame = Frame::around(normal);
         Surface { anchor, front, frame, sample: self.evaluate(&at, material) }
     }
@@ -134,22 +136,29 @@ impl<'a> Surfaces<'a> {
     }
 
     /// Unit, world space, on the front's side.
-    fn shading_normal(&self, at: &At, material: &Material, to_world: Mat3, flat: Vec3) -> Vec3 {
-        let mirrored = to_world.determinant() < 0.0;
+    fn shading_normal(
+        &self,
+        at: &At,
+        material: &Material,
+        to_world: &Affine3A,
+        flat: Vec3,
+    ) -> Vec3 {
+        // Products of axes of 1e-20 m vanish in 32 bits.
+        let (mirrored, matrix) = (mirrors(to_world), to_world.matrix3.as_dmat3());
         let smooth = if at.mesh.normals.is_empty() {
             flat
         } else {
-            let local = at.interpolate(&at.mesh.normals);
-            let across = cofactor(to_world) * local;
-            let normal = if mirrored { -across } else { across }.normalize_or(flat);
+            let local = at.interpolate(&at.mesh.normals).as_dvec3();
+            let across = cofactor(matrix) * local;
+            let normal = across.try_normalize().map_or(flat, |across| across.as_vec3());
             if normal.dot(flat) < 0.0 { -normal } else { normal }
         };
         let Some(used) = &material.normal_texture else { return smooth };
         let texel = self.lookup(at, &material.normal_texture).truncate() * 2.0 - 1.0;
         let bent = texel * Vec3::new(material.normal_scale, material.normal_scale, 1.0);
         let Some((tangent, turn)) = at.tangent(used) else { return smooth };
-        let tangent = to_world * tangent;
-        let Some(tangent) = (tangent - smooth * smooth.dot(tangent)).try_normalize() else {
+        let tangent = (matrix * tangent).reject_from_normalized(smooth.as_dvec3());
+        let Some(tangent) = tangent.try_normalize().map(|tangent| tangent.as_vec3()) else {
             return smooth;
         };
         let turn = if mirrored { -turn } else { turn };
@@ -181,38 +190,38 @@ impl At<'_> {
 
     /// Local tangent, and the sign of the bitangent `normal x tangent`. Derived where the mesh has
     /// none: along growing u; the bitangent then goes up the picture, against growing v.
-    fn tangent(&self, used: &TextureUse) -> Option<(Vec3, f32)> {
+    fn tangent(&self, used: &TextureUse) -> Option<(DVec3, f32)> {
         if !self.mesh.tangents.is_empty() {
             let tangent = self.interpolate(&self.mesh.tangents);
-            return Some((tangent.truncate(), 1.0_f32.copysign(tangent.w)));
+            return Some((tangent.truncate().as_dvec3(), 1.0_f32.copysign(tangent.w)));
         }
         let uvs = self.uv_set(used);
         if uvs.is_empty() {
             return None;
         }
-        let [a, b, c] = self.corners.map(|corner| self.mesh.positions[corner]);
-        let [ta, tb, tc] = self.corners.map(|corner| used.map(uvs[corner]));
+        let [a, b, c] = self.corners.map(|corner| self.mesh.positions[corner].as_dvec3());
+        let [ta, tb, tc] = self.corners.map(|corner| used.map(uvs[corner]).as_dvec2());
         let (ab, ac) = (b - a, c - a);
         let (tb, tc) = (tb - ta, tc - ta);
         let area = tb.perp_dot(tc);
-        let along_u = (ab * tc.y - ac * tb.y) * 1.0_f32.copysign(area);
+        let along_u = (ab * tc.y - ac * tb.y) * 1f64.copysign(area);
         // With v downwards a texture that is not mirrored winds the other way than its triangle.
-        (area != 0.0).then_some((along_u, -1.0_f32.copysign(area)))
+        (area != 0.0).then_some((along_u, -1f32.copysign(area as f32)))
     }
 }
 
 /// `det(M) M^-T`, which takes normals along; finite for any matrix.
-fn cofactor(m: Mat3) -> Mat3 {
-    Mat3::from_cols(m.y_axis.cross(m.z_axis), m.z_axis.cross(m.x_axis), m.x_axis.cross(m.y_axis))
+fn cofactor(m: DMat3) -> DMat3 {
+    DMat3::from_cols(m.y_axis.cross(m.z_axis), m.z_axis.cross(m.x_axis), m.x_axis.cross(m.y_axis))
 }
 
-/// The unit normal, bent just so far that `wo` is above its horizon.
-fn toward(normal: Vec3, wo: Vec3) -> Vec3 {
+/// The unit normal, bent just so far that its cosine with `wo` is not below the least.
+fn toward(normal: Vec3, wo: Vec3, least: f32) -> Vec3 {
     let cosine = normal.dot(wo);
-    if cosine >= LEAST_COSINE {
+    if cosine >= least {
         return normal;
     }
-    (normal + wo * (LEAST_COSINE - cosine)).normalize_or(wo)
+    (normal + wo * (least - cosine)).normalize_or(wo)
 }
 
 #[cfg(test)]

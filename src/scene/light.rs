@@ -1,9 +1,9 @@
 //! Lights that are not meshes.
 
-use super::Keys;
+use super::{Keys, Visibility};
 use crate::math::color::Rgb;
 
-/// A light at a node. Where it aims, it aims along the node's local -Z.
+/// A light at a node. A light that aims does so along the node's local -Z, through its matrix.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Light {
     /// The node it stands at; the node's path is the light's path.
@@ -17,6 +17,8 @@ pub struct Light {
     pub range_m: Option<f32>,
     /// Take it out of the importance heuristic and sample it at every point.
     pub forced: bool,
+    /// Which rays meet it: a sphere; and at infinity a sun or a dome, which casts no shadow.
+    pub visibility: Visibility,
 }
 
 /// The kinds of light that are not meshes.
@@ -34,8 +36,8 @@ pub enum LightKind {
         /// How intensity falls off the axis.
         shaping: Shaping,
     },
-    /// A sphere sampled as a sphere. Its radius is in the node's local space: the node's
-    /// transform must scale uniformly.
+    /// A sphere that is sampled as a sphere. Its radius is in the node's local space, and the node's
+    /// transform must scale evenly.
     Sphere {
         /// Luminance of the surface, nits.
         radiance_nits: Rgb,
@@ -44,7 +46,7 @@ pub enum LightKind {
         /// Emission profile about -Z, if it has one.
         shaping: Option<Shaping>,
     },
-    /// A sun: parallel or nearly parallel light travelling along -Z.
+    /// A sun: parallel or nearly parallel light that travels along -Z.
     Distant {
         /// Illuminance on a surface that faces it, lux.
         irradiance_lux: Rgb,
@@ -53,8 +55,9 @@ pub enum LightKind {
     },
     /// Light from all around: constant, or a latitude-longitude picture.
     ///
-    /// The picture is laid out as UsdLux says: in local space +Y is its top row; direction
-    /// `(x, y, z)` is at `u = fract((atan2(z, x) + pi/2) / 2pi)`, `v = acos(y) / pi`.
+    /// The picture is laid out as UsdLux says: in local space +Y is its top row, and direction
+    /// `(x, y, z)` is at `u = fract((atan2(z, x) + pi/2) / 2pi)`, `v = acos(y) / pi`. Directions go
+    /// through the node's matrix as it is: an uneven scale stretches the picture.
     Dome {
         /// Luminance, or what the texture is multiplied by, nits.
         radiance_nits: Rgb,

@@ -1,6 +1,6 @@
 //! Triangles, and where they stand.
 
-use super::{Keys, Shaping};
+use super::{Keys, Shaping, Visibility};
 use crate::math::color::Rgb;
 use glam::{Vec2, Vec3, Vec4};
 
@@ -43,4 +43,6 @@ pub struct Instance {
     pub shaping: Option<Shaping>,
     /// Take the mesh's light out of the importance heuristic and sample it at every point.
     pub forced: bool,
+    /// Which rays meet it.
+    pub visibility: Visibility,
 }

@@ -17,7 +17,8 @@
 //!
 //! Units: metres, seconds, radians; +Y is up. Emission is in the file's own photometric numbers
 //! (nits, candela, lux): radiance 1 in the file is 1 in the picture.
-//! Spaces: a mesh and a light are in their node's *local* space; [`Pose`] takes local to *world*.
+//! Spaces: a mesh and a light are in their node's *local* space; [`Pose`] takes local to *world*,
+//! whose origin is [`Scene::origin`].
 
 mod camera;
 mod light;
@@ -25,10 +26,13 @@ mod material;
 mod medium;
 mod mesh;
 mod pose;
+mod posing;
 mod requirements;
+mod steady;
 mod texture;
 mod timeline;
 mod values;
+mod visibility;
 
 pub use camera::{Camera, Projection};
 pub use light::{Light, LightKind, Shaping};
@@ -36,10 +40,13 @@ pub use material::{AlphaMode, Material};
 pub use medium::{FogBox, Medium};
 pub use mesh::{Instance, Mesh};
 pub use pose::{Channel, Interpolation, Keys, Node, Pose, Trs};
+pub use posing::Posing;
 pub use requirements::Requirements;
 pub use texture::{Pixels, Texture, TextureUse, Wrap};
 pub use timeline::Timeline;
+pub use visibility::Visibility;
 
+use glam::DVec3;
 use std::path::PathBuf;
 
 /// Everything ingest found, by index. See the [module page](self).
@@ -65,6 +72,9 @@ pub struct Scene {
     pub medium: Option<Medium>,
     /// Cameras, in the file's order.
     pub cameras: Vec<Camera>,
+    /// Where the origin of poses is, in the file's world, metres: what is subtracted from every
+    /// position before it is rounded to 32 bits, and added to those that are shown.
+    pub origin: DVec3,
     /// How frame numbers map to seconds.
     pub timeline: Timeline,
     /// What the file holds and this scene does not, in words for the user; each names its object.
@@ -74,7 +84,7 @@ pub struct Scene {
 impl Scene {
     /// Where everything is and how strong it shines at `time_s` seconds on the file's clock.
     pub fn pose_at(&self, time_s: f64) -> Pose {
-        Pose::evaluate(self, time_s)
+        Pose::evaluate(self, time_s).0
     }
 
     /// For each node, whether it moves with time.
@@ -82,8 +92,8 @@ impl Scene {
         pose::moving(&self.nodes)
     }
 
-    /// For each node, whether it keeps shapes and sizes however it moves: neither it nor an ancestor
-    /// scales unevenly, or with time.
+    /// For each node, whether it keeps shapes however it moves: neither it nor an ancestor scales
+    /// unevenly at any time, or down to nothing.
     pub fn rigid_nodes(&self) -> Vec<bool> {
         pose::rigid(&self.nodes)
     }

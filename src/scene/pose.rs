@@ -1,6 +1,8 @@
-//! The transform hierarchy, and the evaluation of whatever is animated at a time.
+//! The transform hierarchy, and what is animated evaluated at a time.
+//!
+//! A key counts as at a frame's time if it is [meant to be](Timeline::is_same).
 
-use super::Scene;
+use super::{Scene, Timeline};
 use crate::math::color::Rgb;
 use glam::{Affine3A, DAffine3, DQuat, DVec3, Quat, Vec3};
 
@@ -33,7 +35,7 @@ pub enum Trs {
     },
 }
 
-/// One animated part of a node's transform. `times_s` ascends and is not empty.
+/// One animated part of a node's transform.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Channel {
     /// Metres.
@@ -67,14 +69,14 @@ pub enum Interpolation {
     Cubic,
 }
 
-/// What varies, at one time: world transforms of all nodes, strengths of the lights that have keys.
+/// Whatever varies, at one time: world transforms of all nodes, strengths of the lights with keys.
 #[derive(Clone, Debug)]
 pub struct Pose {
-    world: Vec<Affine3A>,
-    /// By row of [`Scene::lights`]; empty if none varies.
-    light_rgb: Vec<Option<Rgb>>,
-    /// By row of [`Scene::instances`]; empty if none varies.
-    instance_rgb: Vec<Option<Rgb>>,
+    pub(super) world: Vec<Affine3A>,
+    /// By row of [`Scene::lights`]; empty if none has keys.
+    pub(super) light_rgb: Vec<Option<Rgb>>,
+    /// By row of [`Scene::instances`]; empty if none has keys.
+    pub(super) instance_rgb: Vec<Option<Rgb>>,
 }
 
 impl Default for Trs {
@@ -84,27 +86,26 @@ impl Default for Trs {
 }
 
 impl Pose {
-    /// Composes the hierarchy in double precision, so that only the result is rounded.
-    pub(super) fn evaluate(scene: &Scene, time_s: f64) -> Pose {
+    /// Composes the hierarchy in double precision, so that only the result is rounded. Returns the
+    /// unrounded transforms too.
+    pub(super) fn evaluate(scene: &Scene, time_s: f64) -> (Pose, Vec<DAffine3>) {
+        let at = Instant { time_s, timeline: scene.timeline };
         let mut exact: Vec<DAffine3> = Vec::with_capacity(scene.nodes.len());
         for node in &scene.nodes {
-            let local = node.local_at(time_s);
-            exact.push(match node.parent {
-                Some(parent) => exact[parent as usize] * local,
-                None => local,
-            });
+            exact.push(node.in_world(scene.origin, &exact, at));
         }
         let lights = scene.lights.iter().map(|light| light.values.as_ref());
         let instances = scene.instances.iter().map(|instance| instance.values.as_ref());
-        Pose {
+        let pose = Pose {
             world: exact.iter().map(DAffine3::as_affine3a).collect(),
-            light_rgb: values_at(lights, time_s),
-            instance_rgb: values_at(instances, time_s),
-        }
+            light_rgb: values_at(lights, at),
+            instance_rgb: values_at(instances, at),
+        };
+        (pose, exact)
     }
 
-    /// The world-space radius of a sphere of some local radius at a node, metres: it grows with the
-    /// cube root of the volume. What samples a sphere and what hits it must agree to the last bit.
+    /// The world-space radius of a sphere of some local radius at a node, metres. It grows with the
+    /// cube root of the volume. Sampling and intersection both use it: they must agree to the last bit.
     pub fn world_radius(&self, node: u32, radius: f32) -> f32 {
         let volume = self.world(node).matrix3.as_dmat3().determinant().abs();
         (f64::from(radius) * volume.cbrt()) as f32
@@ -122,7 +123,7 @@ impl Pose {
         self.instance_rgb.get(instance as usize).copied().flatten()
     }
 
-    /// Local to world for a node.
+    /// Local to world for a node, from [`Scene::origin`] on.
     #[inline]
     pub fn world(&self, node: u32) -> Affine3A {
         self.world[node as usize]
@@ -132,12 +133,12 @@ impl Pose {
 /// The values of a table at a time; no table if it has no keys.
 fn values_at<'a>(
     rows: impl Iterator<Item = Option<&'a Keys<Rgb>>> + Clone,
-    time_s: f64,
+    at: Instant,
 ) -> Vec<Option<Rgb>> {
     if rows.clone().all(|keys| keys.is_none()) {
         return Vec::new();
     }
-    rows.map(|keys| Some(keys?.vector_at(time_s).as_vec3())).collect()
+    rows.map(|keys| Some(keys?.vector_at(at).as_vec3())).collect()
 }
 
 /// Which nodes move: those with channels, and all below them.
@@ -150,12 +151,15 @@ pub(super) fn moving(nodes: &[Node]) -> Vec<bool> {
     moves
 }
 
-/// Which nodes never change what is below them but by a similarity of one scale.
+/// Which nodes never change what is below them but by a similarity, at any time.
 pub(super) fn rigid(nodes: &[Node]) -> Vec<bool> {
     let mut rigid: Vec<bool> = Vec::with_capacity(nodes.len());
     for node in nodes {
         let above = node.parent.is_none_or(|parent| rigid[parent as usize]);
-        let keeps_size = !node.channels.iter().any(|c| matches!(c, Channel::Scale(_)));
+        let keeps_size = node.channels.iter().all(|channel| match channel {
+            Channel::Scale(keys) => keys.never_vanishes(),
+            _ => true,
+        });
         rigid.push(above && keeps_size && node.scales_evenly(RIGID_TOLERANCE));
     }
     rigid
@@ -163,6 +167,8 @@ pub(super) fn rigid(nodes: &[Node]) -> Vec<bool> {
 
 /// How far a scale may be from uniform for a shape to be kept, to the last bits.
 const RIGID_TOLERANCE: f64 = 1e-6;
+/// A scale that falls below this part of its largest is flat for a while.
+const LEAST_OF_LARGEST: f32 = 1e-4;
 
 impl Node {
     /// Whether the node's own transform keeps shapes at every time, up to a relative tolerance.
@@ -193,21 +199,37 @@ impl Node {
         Node { path: path.into(), parent, local, channels: Vec::new() }
     }
 
+    /// Local to world at a time, seen from an origin, given that of all nodes before.
+    pub(super) fn in_world(&self, origin: DVec3, before: &[DAffine3], at: Instant) -> DAffine3 {
+        let local = self.local_at(at);
+        match self.parent {
+            Some(parent) => before[parent as usize] * local,
+            None => DAffine3 { translation: local.translation - origin, ..local },
+        }
+    }
+
     /// Local to parent at a time.
-    fn local_at(&self, time_s: f64) -> DAffine3 {
+    fn local_at(&self, at: Instant) -> DAffine3 {
         let (mut translation, mut rotation, mut scale) = match self.local {
             Trs::Matrix(matrix) => return matrix,
             Trs::Parts { translation, rotation, scale } => (translation, rotation, scale),
         };
         for channel in &self.channels {
             match channel {
-                Channel::Translation(keys) => translation = keys.vector_at(time_s),
-                Channel::Scale(keys) => scale = keys.vector_at(time_s),
-                Channel::Rotation(keys) => rotation = keys.rotation_at(time_s),
+                Channel::Translation(keys) => translation = keys.vector_at(at),
+                Channel::Scale(keys) => scale = keys.vector_at(at),
+                Channel::Rotation(keys) => rotation = keys.rotation_at(at),
             }
         }
         DAffine3::from_scale_rotation_translation(scale, rotation, translation)
     }
+}
+
+/// A time at which everything is evaluated.
+#[derive(Clone, Copy)]
+pub(super) struct Instant {
+    pub(super) time_s: f64,
+    pub(super) timeline: Timeline,
 }
 
 /// Where a time falls among keys: the two neighbours, the fraction between them, their distance.
@@ -219,16 +241,22 @@ struct Between {
 }
 
 impl<T: Copy> Keys<T> {
-    fn find(&self, time_s: f64) -> Between {
-        let after = self.times_s.partition_point(|&key| f64::from(key) <= time_s);
+    fn find(&self, at: Instant) -> Between {
+        let after = self.times_s.partition_point(|&key| f64::from(key) <= at.time_s);
         let last = self.times_s.len() - 1;
+        let held = |i| Between { before: i, after: i, fraction: 0.0, step_s: 0.0 };
         if after == 0 || after > last {
-            let held = if after == 0 { 0 } else { last };
-            return Between { before: held, after: held, fraction: 0.0, step_s: 0.0 };
+            return held(after.min(last));
         }
-        let (t0, t1) = (f64::from(self.times_s[after - 1]), f64::from(self.times_s[after]));
-        let fraction = (time_s - t0) / (t1 - t0);
-        Between { before: after - 1, after, fraction, step_s: t1 - t0 }
+        let before = after - 1;
+        let [t0, t1] = [before, after].map(|i| f64::from(self.times_s[i]));
+        let (since, step_s) = (at.time_s - t0, t1 - t0);
+        // The nearer key decides whether the time is that of a key.
+        let (nearer, key_s) = if 2.0 * since < step_s { (before, t0) } else { (after, t1) };
+        if at.timeline.is_same(at.time_s, key_s) {
+            return held(nearer);
+        }
+        Between { before, after, fraction: since / step_s, step_s }
     }
 
     /// Hermite weights of (value, out-tangent, value, in-tangent), glTF 2.0 appendix C.
@@ -256,8 +284,19 @@ impl Keys<Vec3> {
         self.values.iter().fold(Vec3::ZERO, |peak, &value| peak.max(value))
     }
 
-    fn vector_at(&self, time_s: f64) -> DVec3 {
-        let at = self.find(time_s);
+    /// Whether a scale, the same along all axes, stays well away from zero between keys too.
+    fn never_vanishes(&self) -> bool {
+        let largest = self.values.iter().fold(0f32, |largest, value| largest.max(value.x.abs()));
+        let least = LEAST_OF_LARGEST * largest;
+        let (above, below) = (Vec3::splat(least), Vec3::splat(-least));
+        // A spline may pass through zero between keys that do not.
+        self.interpolation != Interpolation::Cubic
+            && (self.values.iter().all(|value| value.cmpgt(above).all())
+                || self.values.iter().all(|value| value.cmplt(below).all()))
+    }
+
+    pub(super) fn vector_at(&self, at: Instant) -> DVec3 {
+        let at = self.find(at);
         match self.interpolation {
             Interpolation::Linear => {
                 let (a, b) = (self.values[at.before].as_dvec3(), self.values[at.after].as_dvec3());
@@ -274,8 +313,8 @@ impl Keys<Vec3> {
 }
 
 impl Keys<Quat> {
-    fn rotation_at(&self, time_s: f64) -> DQuat {
-        let at = self.find(time_s);
+    fn rotation_at(&self, at: Instant) -> DQuat {
+        let at = self.find(at);
         match self.interpolation {
             Interpolation::Linear => {
                 let (a, b) = (self.values[at.before].as_dquat(), self.values[at.after].as_dquat());

@@ -1,6 +1,6 @@
 //! What a scene needs of the tree and the renderer.
 
-use super::{AlphaMode, Camera, LightKind, Projection, Scene};
+use super::{AlphaMode, Camera, Keys, LightKind, Projection, Scene};
 use serde::Serialize;
 
 /// The features that a scene switches on. What is false or zero here costs nothing anywhere.
@@ -52,14 +52,15 @@ impl Requirements {
                 && scene.peak_rgb_of_instance(number).max_element() > 0.0
             {
                 needs.mesh_lights += 1;
-                needs.varying_lights += usize::from(instance.values.is_some());
+                needs.varying_lights +=
+                    usize::from(instance.values.as_ref().is_some_and(Keys::varies));
                 needs.textured_mesh_lights += usize::from(material.emission_texture.is_some());
                 needs.shaped_lights += usize::from(instance.shaping.is_some());
             }
         }
         needs.shared_meshes = uses.iter().filter(|&&count| count > 1).count();
         for light in &scene.lights {
-            needs.varying_lights += usize::from(light.values.is_some());
+            needs.varying_lights += usize::from(light.values.as_ref().is_some_and(Keys::varies));
             match light.kind {
                 LightKind::Point { .. } => needs.points += 1,
                 LightKind::Spot { .. } => needs.spots += 1,

@@ -1,7 +1,8 @@
 //! Decoded images and how they are looked up.
 
 use crate::math::color::srgb_to_linear;
-use glam::{Affine2, Vec2, Vec3, Vec4};
+use glam::{Affine2, DVec3, Vec2, Vec3, Vec4};
+use std::ops::Range;
 use std::sync::LazyLock;
 
 /// An image, ready to be looked up.
@@ -64,6 +65,14 @@ impl TextureUse {
 }
 
 impl Texture {
+    /// The bytes of the image as it is stored.
+    pub fn bytes(&self) -> &[u8] {
+        match &self.pixels {
+            Pixels::Srgb8(texels) | Pixels::Linear8(texels) => texels.as_flattened(),
+            Pixels::Float(texels) => bytemuck::cast_slice(texels),
+        }
+    }
+
     /// The linear colour and alpha at a texture coordinate (v downwards, as glTF has it).
     pub fn lookup(&self, uv: Vec2) -> Vec4 {
         let size = Vec2::new(self.width as f32, self.height as f32);
@@ -84,6 +93,36 @@ impl Texture {
     pub fn texel(&self, x: i64, y: i64) -> Vec4 {
         let column = self.wrap[0].index(x, self.width);
         let row = self.wrap[1].index(y, self.height);
+        self.stored(column, row)
+    }
+
+    /// The sum of the linear colours of some columns of a row, all inside.
+    ///
+    /// # Panics
+    /// If a texel is behind the last.
+    pub fn sum(&self, columns: Range<usize>, row: usize) -> DVec3 {
+        fn add<T: Copy>(texels: &[T], color: impl Fn(T) -> [f32; 3]) -> DVec3 {
+            let color = |&texel| DVec3::from_array(color(texel).map(f64::from));
+            texels.iter().map(color).sum()
+        }
+        let first = row * self.width as usize;
+        let run = first + columns.start..first + columns.end;
+        match &self.pixels {
+            Pixels::Srgb8(texels) => {
+                let decoded: &[f32; 256] = &SRGB_DECODED;
+                let decode = |code: u8| decoded[usize::from(code)];
+                add(&texels[run], |[r, g, b, _]| [decode(r), decode(g), decode(b)])
+            }
+            Pixels::Linear8(texels) => {
+                add(&texels[run], |[r, g, b, _]| [r, g, b].map(|code| f32::from(code) / 255.0))
+            }
+            Pixels::Float(texels) => add(&texels[run], |texel| texel),
+        }
+    }
+
+    /// One texel by column and row, both inside.
+    #[inline]
+    fn stored(&self, column: usize, row: usize) -> Vec4 {
         let at = row * self.width as usize + column;
         match &self.pixels {
             Pixels::Srgb8(texels) => {
@@ -108,7 +147,7 @@ impl Wrap {
     }
 
     /// Brings a texel index back inside.
-    fn index(self, i: i64, size: u32) -> usize {
+    pub fn index(self, i: i64, size: u32) -> usize {
         let size = i64::from(size);
         let inside = match self {
             Wrap::Repeat => i.rem_euclid(size),

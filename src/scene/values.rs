@@ -1,4 +1,4 @@
-//! How strong lights are: by a constant, or by keys where they vary.
+//! The strength of lights: a constant, or keys where it varies.
 
 use super::{Keys, Pose, Scene};
 use crate::math::color::Rgb;

@@ -22,7 +22,14 @@ pub fn points(count: u32) -> Scene {
         let place = Trs::Parts { translation, rotation: DQuat::IDENTITY, scale: DVec3::ONE };
         scene.nodes.push(Node::fixed(format!("/World/Lights/light_{i:07}"), None, place));
         let kind = LightKind::Point { intensity_cd: Vec3::splat(0.5 + random(i, 7)) };
-        scene.lights.push(Light { node: i, kind, values: None, range_m: None, forced: false });
+        scene.lights.push(Light {
+            node: i,
+            kind,
+            values: None,
+            range_m: None,
+            forced: false,
+            visibility: Default::default(),
+        });
     }
     scene
 }

@@ -1,6 +1,6 @@
 //! `candelabra build` and `candelabra inspect`.
 
-use crate::files::{SCENE, Shot};
+use crate::files::{SCENE, Shot, base64};
 use serde_json::json;
 use std::io::Read;
 use std::process::{Command, Stdio};
@@ -172,6 +172,95 @@ fn a_moving_light_has_a_tree_for_every_frame() {
     shot.candelabra("inspect shot.ltree").ends(0).says("25 trees, 0 instances, 25 frames");
     shot.candelabra(&format!("build {SCENE} --frames 5,1,9")).ends(0).says("(2 change)");
     shot.candelabra("inspect shot.ltree").ends(0).says("3 trees, 0 instances, 3 frames");
+}
+
+/// A lamp of twelve triangles that turns, with some more keys: of a part, at seconds 0 and 1.
+fn turning(more: &[(&str, [[f32; 4]; 2])]) -> Shot {
+    let mut shot = Shot::still();
+    let corner = |i: u32| [(i / 3) as f32, (i % 3 / 2) as f32, (i % 3 % 2) as f32 + 0.1];
+    let mut data: Vec<f32> = (0..36).flat_map(corner).collect();
+    data.extend([0.0, 1.0]);
+    let turns = [("rotation", [[0.0, 0.0, 0.0, 1.0], [0.0, 0.6, 0.0, 0.8]])];
+    let tracks: Vec<_> = turns.iter().chain(more).collect();
+    let mut offsets = Vec::new();
+    for (path, keys) in &tracks {
+        offsets.push(4 * data.len());
+        let parts = if *path == "rotation" { 4 } else { 3 };
+        keys.iter().for_each(|key| data.extend(&key[..parts]));
+    }
+    let bytes: Vec<u8> = data.iter().flat_map(|x| x.to_le_bytes()).collect();
+    shot.edit(|json| {
+        let uri = format!("data:application/octet-stream;base64,{}", base64(&bytes));
+        let list = |json: &mut serde_json::Value, name: &str, row: serde_json::Value| {
+            let rows = json[name].as_array_mut().unwrap();
+            rows.push(row);
+            rows.len() - 1
+        };
+        list(json, "buffers", json!({"uri": uri, "byteLength": bytes.len()}));
+        let mut accessor = |at: usize, count: usize, kind: &str, bounds: Option<[[f32; 3]; 2]>| {
+            let parts = match kind {
+                "SCALAR" => 1,
+                "VEC3" => 3,
+                _ => 4,
+            };
+            let view = json!({"buffer": 1, "byteOffset": at, "byteLength": 4 * parts * count});
+            let view = list(json, "bufferViews", view);
+            let mut row =
+                json!({"bufferView": view, "componentType": 5126, "count": count, "type": kind});
+            match (kind, bounds) {
+                ("SCALAR", _) => (row["min"], row["max"]) = (json!([0]), json!([1])),
+                (_, Some([min, max])) => (row["min"], row["max"]) = (json!(min), json!(max)),
+                _ => {}
+            }
+            list(json, "accessors", row)
+        };
+        let positions = accessor(0, 36, "VEC3", Some([[0.0, 0.0, 0.1], [11.0, 1.0, 1.1]]));
+        let times = accessor(432, 2, "SCALAR", None);
+        let (mut samplers, mut channels) = (Vec::new(), Vec::new());
+        for ((path, _), at) in tracks.iter().zip(&offsets) {
+            let kind = if *path == "rotation" { "VEC4" } else { "VEC3" };
+            let output = accessor(*at, 2, kind, None);
+            let target = json!({"node": 1, "path": path});
+            channels.push(json!({"sampler": samplers.len(), "target": target}));
+            samplers.push(json!({"input": times, "output": output}));
+        }
+        json["animations"] = json!([{"samplers": samplers, "channels": channels}]);
+        json["meshes"][1]["primitives"] =
+            json!([{"attributes": {"POSITION": positions}, "material": 1}]);
+        json["nodes"][1] = json!({"name": "lamp", "mesh": 1});
+    });
+    shot
+}
+
+/// What counts is whether values vary, not whether there are keys.
+#[test]
+fn a_track_that_says_one_thing_costs_nothing() {
+    let trees = |shot: &Shot| {
+        shot.candelabra(&format!("build {SCENE} -o a.ltree"))
+            .ends(0)
+            .says("12 emitters (12 change)");
+        let inspected = shot.candelabra("inspect a.ltree").ends(0).out;
+        (
+            shot.read("a.ltree").len(),
+            inspected.lines().find(|line| line.contains(" trees, ")).map(str::to_owned),
+        )
+    };
+    let plain = trees(&turning(&[]));
+    let steady = [[1.0, 1.0, 1.0, 0.0], [1.000_000_1, 0.999_999_9, 1.0, 0.0]];
+    let here = [[0.0; 4]; 2];
+    for more in [
+        vec![("scale", steady)],
+        vec![("translation", here)],
+        vec![("translation", here), ("scale", steady)],
+    ] {
+        assert_eq!(trees(&turning(&more)), plain);
+    }
+    // It grows evenly: it keeps its shape, and its tree.
+    let grows = [[1.0, 1.0, 1.0, 0.0], [3.0, 3.0, 3.0, 0.0]];
+    assert_eq!(trees(&turning(&[("scale", grows)])), plain);
+    // It is bent: it has a tree for every frame.
+    let bends = [[1.0, 1.0, 1.0, 0.0], [3.0, 1.0, 1.0, 0.0]];
+    assert!(trees(&turning(&[("scale", bends)])).0 > 2 * plain.0);
 }
 
 #[test]

@@ -5,8 +5,12 @@ mod diff;
 mod disk;
 mod files;
 mod inspect;
+mod lies;
 mod lights;
 mod pages;
+#[allow(dead_code)]
+#[path = "../fuzz/probe/tree.rs"]
+mod probe;
 mod render;
 mod resume;
 mod trees;

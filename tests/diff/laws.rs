@@ -33,7 +33,14 @@ fn row(edits: &[Edit]) -> Scene {
     let add = |scene: &mut Scene, name: String, x: f64, strength: f32| {
         let node = put(scene, &name, [x, 3.0, 0.0]);
         let kind = LightKind::Point { intensity_cd: Vec3::splat(strength) };
-        scene.lights.push(Light { node, kind, values: None, range_m: None, forced: false });
+        scene.lights.push(Light {
+            node,
+            kind,
+            values: None,
+            range_m: None,
+            forced: false,
+            visibility: Default::default(),
+        });
     };
     (0..12).for_each(|i| add(&mut scene, format!("lamp_{i}"), f64::from(i), 5.0 + i as f32));
     let intensity = |scene: &mut Scene, row: usize, change: &dyn Fn(Vec3) -> Vec3| {

@@ -22,7 +22,14 @@ pub fn street() -> Scene {
     let mut scene = Scene { source: "street.gltf".into(), ..Scene::default() };
     let mut light = |place: [f64; 3], name: &str, kind| {
         let node = put(&mut scene, name, place);
-        scene.lights.push(Light { node, kind, values: None, range_m: None, forced: false });
+        scene.lights.push(Light {
+            node,
+            kind,
+            values: None,
+            range_m: None,
+            forced: false,
+            visibility: Default::default(),
+        });
     };
     let (white, warm) = (Vec3::ONE, Vec3::new(1.0, 0.5, 0.25));
     light([0.0, 3.0, 0.0], "point", LightKind::Point { intensity_cd: 40.0 * white });
@@ -51,7 +58,15 @@ pub fn street() -> Scene {
 /// An instance of a mesh at a node.
 pub fn instance(scene: &Scene, node: u32, mesh: u32) -> Instance {
     let path = scene.nodes[node as usize].path.clone();
-    Instance { path, node, mesh, values: None, shaping: None, forced: false }
+    Instance {
+        path,
+        node,
+        mesh,
+        values: None,
+        shaping: None,
+        forced: false,
+        visibility: Default::default(),
+    }
 }
 
 /// A camera that sees all of it.

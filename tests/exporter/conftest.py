@@ -1,5 +1,6 @@
 """Exports small stages in this process and reads the glTF back."""
 
+import io
 import json
 import os
 import struct
@@ -9,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "scripts"))
@@ -33,8 +35,16 @@ class Export:
     def report(self) -> dict:
         return json.loads(self.report_path.read_text())
 
-    def warned(self) -> set[str]:
-        return {warning["what"] for warning in self.report["warnings"]}
+    def warned(self, category: str | None = None) -> set[str]:
+        lines = self.report["warnings"]
+        return {line["what"] for line in lines if category in (None, line["category"])}
+
+    def noted(self) -> set[str]:
+        return {note["what"] for note in self.report["notes"]}
+
+    def said(self) -> str:
+        """All warnings and notes as one text."""
+        return "\n".join(f"{line['what']}: {line['why']}" for line in self.report["warnings"] + self.report["notes"])
 
 
 class Gltf:
@@ -108,18 +118,39 @@ class Gltf:
             total += np.linalg.norm(cross, axis=1).sum() / 2
         return total
 
-    def world(self, path: str) -> np.ndarray:
+    def world(self, path: str, seconds: float | None = None) -> np.ndarray:
+        """World matrix, at the nearest animation key if a time is given."""
         index, matrix = self.by_path[path], np.eye(4)
         while index is not None:
-            matrix = local_matrix(self.nodes[index]) @ matrix
+            node = dict(self.nodes[index])
+            if seconds is not None:
+                for key, (times, values) in self._channels(index).items():
+                    node[key] = values[np.abs(times - seconds).argmin()].tolist()
+            matrix = local_matrix(node) @ matrix
             index = self.parents.get(index)
         return matrix
 
     def channels(self, path: str) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+        return self._channels(self.by_path[path])
+
+    def image(self, info: dict) -> np.ndarray:
+        """Codes in [0, 1] of a texture's embedded picture, (h, w, 3)."""
+        image = self.json["images"][self.json["textures"][info["index"]]["source"]]
+        view = self.json["bufferViews"][image["bufferView"]]
+        data = self.buffer[view["byteOffset"] : view["byteOffset"] + view["byteLength"]]
+        return np.asarray(Image.open(io.BytesIO(data)).convert("RGB"), dtype=float) / 255
+
+    def light_map(self, path: str) -> np.ndarray:
+        """Nits of an emissive texture's texels."""
+        code = self.image(self.material(path)["emissiveTexture"])
+        linear = np.where(code <= 0.04045, code / 12.92, ((code + 0.055) / 1.055) ** 2.4)
+        return linear * self.nits(path)
+
+    def _channels(self, node: int) -> dict[str, tuple[np.ndarray, np.ndarray]]:
         found = {}
         for animation in self.json.get("animations", []):
             for channel in animation["channels"]:
-                if channel["target"]["node"] == self.by_path[path]:
+                if channel["target"]["node"] == node:
                     sampler = animation["samplers"][channel["sampler"]]
                     assert sampler["interpolation"] == "LINEAR"
                     found[channel["target"]["path"]] = (

@@ -89,7 +89,7 @@ def test_the_report(export, tmp_path):
     result = export(LAMP + "".join(f'\ndef PluginLight "P{i}" {{}}' for i in range(500)), "--report", str(tmp_path / "r.json"))
     report = json.loads((tmp_path / "r.json").read_text())
     assert set(report) >= {"source", "output", "warnings", "counts"}
-    assert set(report["warnings"][0]) == {"path", "what", "why"}
+    assert set(report["warnings"][0]) == {"category", "path", "what", "why"}
     assert report["counts"]["lights RectLight"] == 1
     assert len(report["warnings"]) == 500
     assert len(result.err.splitlines()) == 1 and "500" in result.err
@@ -102,6 +102,153 @@ def test_a_missing_payload_is_named_and_an_error_under_strict(export):
     (warning,) = [w for w in result.report["warnings"] if w["what"] == "missing payload"]
     assert warning["path"] == "/Hall" and "gone/hall.usd" in warning["why"]
     assert export(text, "--strict").code == 1
+
+
+LOSSES = {
+    "lights": 'def RectLight "K" { bool inputs:shadow:enable = 0 }',
+    "materials": 'def Material "M" {}\ndef Cube "C" (prepend apiSchemas = ["MaterialBindingAPI"]) { rel material:binding = </M> }',
+    "geometry": 'def BasisCurves "C" {}',
+    "cameras": 'def Camera "C" { float4[] clippingPlanes = [(0, 1, 0, 2)] }',
+    "animation": 'def Cube "C" { token visibility.timeSamples = { 1: "inherited", 2: "invisible" } }',
+    "other": 'def Xform "Hall" (references = @gone/hall.usd@) {}',
+}
+
+
+@pytest.mark.parametrize("category", LOSSES)
+def test_strict_by_category(export, category):
+    text = LAMP + "\n" + LOSSES[category]
+    others = ",".join(c for c in LOSSES if c != category)
+    result = export(text, f"--strict={others}")
+    assert result.code == 0, result.err
+    assert result.warned() and result.warned() == result.warned(category)
+    assert export(text, f"--strict={category}").code == 1, "an up-to-date output is no excuse"
+    assert export(text, "--strict").code == 1
+    assert export(text, f"--strict={others},{category}").code == 1
+
+
+@pytest.mark.parametrize("scene", sorted(p.stem for p in (ROOT / "scenes").glob("*/*.usda") if p.stem == p.parent.name))
+def test_the_projects_own_scenes_pass_strict(export, scene):
+    result = export(ROOT / "scenes" / scene / f"{scene}.usda", "--strict")
+    assert result.code == 0, result.err
+
+
+def test_strict_never_takes_the_word_after_it(export, tmp_path):
+    (tmp_path / "scene.usda").write_text("#usda 1.0\n")
+    command = [sys.executable, str(ROOT / "scripts" / "usd_to_gltf.py"), "--strict", "scene.usda", "out.glb"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    for wrong in ("--strict=light", "--strict=", "--strict=lights,,"):
+        assert export(LAMP, wrong).code == 2
+
+
+@pytest.mark.parametrize("light", [True, False])
+def test_a_light_that_is_hidden_over_time_is_a_matter_of_lights(export, light):
+    inside = "def SphereLight \"L\" {}" if light else "def Cube \"C\" {}"
+    result = export(f'def Xform "X" {{ token visibility.timeSamples = {{ 1: "inherited", 2: "invisible" }}\n {inside} }}')
+    assert result.warned("lights" if light else "animation") == {"animated visibility"}
+
+
+FILES = {
+    "x.mtlx": ('<?xml version="1.0"?><materialx version="1.38"/>', "is there, but this USD has no plugin for .mtlx (MaterialX)", "materials"),
+    "x.abc": ("Ogawa", "is there, but this USD has no plugin for .abc (Alembic)", "geometry"),
+    "x.vdb": ("VDB", "is there, but this USD has no plugin for .vdb (OpenVDB)", "geometry"),
+    "x.xyz": ("1 2 3", "is there, but this USD has no plugin for .xyz", "other"),
+    "x.usda": ("#usda 1.0\ndef Xform { no", "is there, but cannot be read", "other"),
+    "x.usdc": ("PXR-USDC", "is there, but cannot be read", "other"),
+    "empty.usd": ("", "is there, but cannot be read", "other"),
+    "folder.usda": (None, "is a folder", "other"),
+    "gone.mtlx": ("gone", "cannot be found", "materials"),
+    "gone.usda": ("gone", "cannot be found", "other"),
+}
+ARCS = {
+    "reference": 'def "A" (references = @{}@) {{}}',
+    "payload": 'def "A" (payload = @{}@) {{}}',
+    "sublayer": "#usda 1.0\n(\n subLayers = [@{}@]\n)\n",
+}
+
+
+@pytest.mark.parametrize("arc", ARCS)
+@pytest.mark.parametrize("name", FILES)
+def test_what_a_message_says_of_a_layer_is_what_is_so(export, tmp_path, name, arc):
+    content, words, category = FILES[name]
+    if content is None:
+        (tmp_path / name).mkdir()
+    elif content != "gone":
+        (tmp_path / name).write_text(content)
+    result = export(ARCS[arc].format(name))
+    assert result.code == 0
+    (warning,) = result.report["warnings"]
+    assert warning["category"] == category
+    assert name in warning["why"] and words in warning["why"]
+    assert ("missing" in warning["what"]) == (words == "cannot be found")
+    assert ("payload" in warning["what"]) == (arc == "payload")
+
+
+GOOD = '#usda 1.0\ndef SphereLight "lamp"\n{\n    float inputs:intensity = %s\n}\n'
+
+
+@pytest.mark.parametrize("broken", ["broken.usda", "cache.abc", "missing.usda", "unknown.xyz", "folder.usda"])
+@pytest.mark.parametrize("arc", ["sublayer", "reference"])
+def test_a_layer_that_cannot_be_read_does_not_hide_that_another_changed(export, tmp_path, broken, arc):
+    if broken == "folder.usda":
+        (tmp_path / broken).mkdir()
+    elif broken != "missing.usda":
+        (tmp_path / broken).write_text("#usda 1.0\ndef Xform { this is not usda")
+    text = f"#usda 1.0\n(\n subLayers = [@./good.usda@, @./{broken}@]\n)\n"
+    if arc == "reference":
+        text = f'#usda 1.0\ndef "a" (references = @./{broken}@) {{}}\ndef "b" (references = @./good.usda@</lamp>) {{}}\n'
+    (tmp_path / "root.usda").write_text(text)
+    root = tmp_path / "root.usda"
+    for intensity in (10, 77):
+        (tmp_path / "good.usda").write_text(GOOD % intensity)
+        result = export(root)
+        assert "written" in result.out
+        assert Gltf(result.path).nits("/lamp" if arc == "sublayer" else "/b") == pytest.approx([intensity] * 3)
+        assert "up to date" in export(root).out
+    # What could not be read is part of the key too: mended, it is read.
+    if broken.endswith(".usda") and broken != "folder.usda":
+        (tmp_path / broken).write_text('#usda 1.0\n(\n defaultPrim = "x"\n)\ndef Xform "x" {\n def Cube "C" {}\n}\n')
+        assert "written" in export(root).out
+
+
+def test_textures_that_come_and_go_are_noticed(export, tmp_path):
+    from PIL import Image
+
+    text = 'def RectLight "L" { asset inputs:texture:file = @t.png@ }'
+    assert "missing texture" in export(text).warned()
+    assert "up to date" in export(text).out
+    Image.new("RGB", (2, 2), (9, 9, 9)).save(tmp_path / "t.png")
+    assert "written" in export(text).out
+    (tmp_path / "t.png").unlink()
+    assert "written" in export(text).out
+
+
+def test_a_moved_folder_is_still_up_to_date(export, tmp_path):
+    first = tmp_path / "a"
+    first.mkdir()
+    (first / "good.usda").write_text(GOOD % 3)
+    (first / "root.usda").write_text("#usda 1.0\n(\n subLayers = [@./good.usda@]\n)\n")
+    assert "written" in export(first / "root.usda", out="a/out.glb").out
+    first.rename(tmp_path / "b")
+    assert "up to date" in export(tmp_path / "b" / "root.usda", out="b/out.glb").out
+    # A report of another source is no proof.
+    (tmp_path / "b" / "other.usda").write_text("#usda 1.0\n")
+    assert "written" in export(tmp_path / "b" / "other.usda", out="b/out.glb").out
+
+
+def test_a_layer_that_changes_while_it_is_read_is_exported_again(export, tmp_path, monkeypatch):
+    import time
+
+    import usd_gltf.source_hash as module
+
+    # The export seems to start long before the layer was last written.
+    ticks = iter([time.time_ns() - 10**12])
+    monkeypatch.setattr(module.time, "time_ns", lambda real=time.time_ns: next(ticks, real()))
+    assert "written" in export(LAMP).out
+    monkeypatch.undo()
+    (tmp_path / "scene.usda").touch()  # no content changes from here on
+    assert "written" in export(tmp_path / "scene.usda").out
+    assert "up to date" in export(tmp_path / "scene.usda").out
 
 
 def test_a_missing_source_is_one_line(export, tmp_path):

@@ -155,12 +155,6 @@ def test_a_normalized_point_has_a_quarter_of_its_intensity_whatever_its_radius(g
     assert scene.light("/L")["intensity"] == pytest.approx(2 * factor, rel=1e-6)
 
 
-def test_a_sphere_without_radius_or_normalize_emits_nothing_and_says_so(export):
-    result = export('def SphereLight "L" { float inputs:radius = 0 }')
-    assert result.code == 0
-    assert "SphereLight emits nothing" in result.warned()
-
-
 def test_a_normalized_flat_light_without_size_keeps_its_cosine(gltf):
     scene = gltf('def DiskLight "L" { float inputs:radius = 0\n bool inputs:normalize = 1\n float inputs:intensity = 6 }')
     assert scene.light("/L")["type"] == "spot"

@@ -113,3 +113,33 @@ def test_instances_of_a_mesh_light_share_their_mesh(gltf):
     )
     assert scene.node("/A/M")["mesh"] == scene.node("/B/M")["mesh"]
     assert scene.lux("/B/M")["type"] == "MeshLight"
+
+
+ANIMATED_GLOW = """#usda 1.0
+(
+    startTimeCode = 1
+    endTimeCode = 3
+    metersPerUnit = 1
+    upAxis = "Y"
+)
+def Material "Mat" {
+    token outputs:surface.connect = </Mat/S.outputs:surface>
+    def Shader "S" {
+        uniform token info:id = "UsdPreviewSurface"
+        color3f inputs:emissiveColor.timeSamples = { 1: (0, 0, 0), 3: (4, 2, 0) }
+        token outputs:surface
+    }
+}
+"""
+
+
+def test_a_glow_that_is_animated_has_keys(gltf):
+    scene = gltf(ANIMATED_GLOW + 'def Cube "C" (prepend apiSchemas = ["MaterialBindingAPI"]) { rel material:binding = </Mat> }')
+    assert scene.lux("/C")["type"] == "MeshLight"
+    assert scene.lux("/C")["values"]["rgb"] == [[0, 0, 0], [2, 1, 0], [4, 2, 0]]
+
+
+def test_a_glow_that_cannot_be_animated_is_a_matter_of_lights(export):
+    apis = '["MeshLightAPI", "MaterialBindingAPI"]'
+    result = export(ANIMATED_GLOW + f'def Cube "C" (prepend apiSchemas = {apis}) {{ rel material:binding = </Mat> }}')
+    assert "animated emissiveColor" in result.warned("lights")

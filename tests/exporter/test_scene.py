@@ -213,6 +213,81 @@ def test_cameras(gltf):
     }
 
 
+def camera(gltf, lines: str, header: str = "metersPerUnit = 0.01"):
+    scene = gltf(f'#usda 1.0\n(\n{header}\n)\ndef Camera "Cam" {{ {lines} }}')
+    return scene.json["cameras"][scene.node("/Cam")["camera"]], scene.node("/Cam")["extras"]["usdCamera"]
+
+
+@pytest.mark.parametrize(
+    ("lines", "scale"),
+    [
+        ("", None),
+        ("float exposure = 0", None),
+        ("float exposure = 2", 4),
+        ("float exposure = -3", 1 / 8),
+        ("float exposure:iso = 400", 4),
+        ("float exposure:time = 0.02", 0.02),
+        ("float exposure:fStop = 2", 1 / 4),
+        ("float exposure:responsivity = 3", 3),
+        ("float exposure = 1\n float exposure:iso = 200\n float exposure:time = 0.5\n float exposure:fStop = 4", 2 / 16),
+    ],
+)
+def test_a_cameras_exposure_is_a_factor(gltf, lines, scale):
+    extras = camera(gltf, lines)[1]
+    assert extras.get("exposureScale") == (None if scale is None else pytest.approx(scale))
+
+
+@pytest.mark.parametrize("lines", ["float exposure = nan", "float exposure = 1e6", "float exposure:fStop = 0", "float exposure:iso = -1"])
+def test_an_exposure_that_is_no_factor_is_reported(export, lines):
+    result = export(f'def Camera "Cam" {{ {lines} }}')
+    assert result.code == 0
+    assert "camera exposure is no factor" in result.warned("cameras")
+
+
+def test_clipping_ranges_are_metres_and_the_fallback_is_none(gltf):
+    assert "clippingRange_m" not in camera(gltf, "")[1]
+    assert "clippingRange_m" not in camera(gltf, "float2 clippingRange = (1, 1000000)")[1]
+    gltf_camera, extras = camera(gltf, "float2 clippingRange = (10, 5000)")
+    assert extras["clippingRange_m"] == pytest.approx([0.1, 50])
+    assert (gltf_camera["perspective"]["znear"], gltf_camera["perspective"]["zfar"]) == pytest.approx((0.1, 50))
+
+
+@pytest.mark.parametrize("clip", ["(5, 5)", "(9, 2)", "(nan, 3)"])
+def test_a_clipping_range_that_is_none_is_reported(export, clip):
+    result = export(f'def Camera "Cam" {{ float2 clippingRange = {clip} }}')
+    assert "clippingRange is no range" in result.warned("cameras")
+
+
+def test_orthographic_cameras_have_half_their_aperture_in_metres(gltf):
+    lines = """token projection = "orthographic"
+        float horizontalAperture = 4000
+        float verticalAperture = 1000
+        float focalLength = 0
+        float2 clippingRange = (-20, 500)"""
+    gltf_camera, extras = camera(gltf, lines)
+    assert gltf_camera["type"] == "orthographic"
+    assert gltf_camera["orthographic"] == {
+        "xmag": pytest.approx(2), "ymag": pytest.approx(0.5), "znear": 0, "zfar": pytest.approx(5)
+    }  # fmt: skip
+    assert extras["clippingRange_m"] == pytest.approx([-0.2, 5])
+
+
+def test_what_a_camera_loses_is_listed(export):
+    text = """def Camera "Cam" {
+        float4[] clippingPlanes = [(0, 1, 0, 2)]
+        double shutter:open = -0.25
+        double shutter:close = 0.25
+        float primvars:arnold:focus_distance = 3
+        float houdini:guidescale = 1
+    }"""
+    still = export(text)
+    assert still.warned("cameras") == {"clippingPlanes", "arnold attributes"}
+    assert {"camera shutter", "houdini attributes without effect"} <= still.noted(), "nothing moves"
+    assert "camera shutter" in export(ANIMATED + text).warned("cameras")
+    assert export(text, "--strict=cameras").code == 1
+    assert export(text, "--strict=lights,materials,geometry,animation,other").code == 0
+
+
 ANIMATED = """#usda 1.0
 (
     startTimeCode = 1
@@ -285,18 +360,23 @@ def test_shear_is_carried_exactly_by_two_nodes(gltf):
     assert scene.world("/S") == pytest.approx(expected, abs=1e-6)
 
 
-def test_animated_shear_is_reported(export):
-    result = export(
-        ANIMATED
-        + """def Cube "S" {
-            matrix4d xformOp:transform.timeSamples = {
-                1: ((1, 0, 0, 0), (0.5, 1, 0, 0), (0, 0, 1, 0), (0, 0, 0, 1)),
-                2: ((1, 0, 0, 0), (0.9, 1, 0, 0), (0, 0, 1, 0), (0, 0, 0, 1)),
-            }
-            uniform token[] xformOpOrder = ["xformOp:transform"]
-        }"""
+def test_animated_shear_is_exact_at_every_frame(gltf):
+    """A direction goes through the matrix, also below a moving, unevenly scaled rig."""
+    rows = {1: (0.5, 1, 0.2), 2: (0.9, 1.4, -0.3), 3: (-0.6, 0.4, 0), 4: (0, 1, 0), 5: (2, 1, 1)}
+    samples = ", ".join(
+        f"{code}: ((1, 0, 0, 0), ({a}, {b}, {c}, 0), (0, 0.3, -2, 0), ({code}, 4, 5, 1))" for code, (a, b, c) in rows.items()
     )
-    assert "animated shear" in result.warned()
+    scene = gltf(
+        ANIMATED
+        + f"""def Xform "Rig" {{
+            matrix4d xformOp:transform.timeSamples = {{ {samples} }}
+            uniform token[] xformOpOrder = ["xformOp:transform"]
+            def DistantLight "Sun" {{}}
+        }}"""
+    )
+    for code, (a, b, c) in rows.items():
+        expected = np.array([[1, a, 0, code], [0, b, 0.3, 4], [0, c, -2, 5], [0, 0, 0, 1]])
+        assert scene.world("/Rig/Sun", (code - 1) / 24) == pytest.approx(expected, abs=1e-5)
 
 
 def test_reset_xform_stack(gltf):

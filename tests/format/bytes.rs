@@ -9,6 +9,7 @@ const ROW: usize = 32;
 #[derive(Clone)]
 pub struct Parts {
     pub version: [u16; 2],
+    pub fingerprint: [u8; 32],
     pub sections: Vec<Section>,
 }
 
@@ -38,7 +39,8 @@ impl Parts {
             element: u32_at(row, 24),
             bytes: file[usize_at(row, 8)..][..usize_at(row, 16)].to_vec(),
         };
-        Parts { version: [1, 0], sections: rows.map(section).collect() }
+        let fingerprint = file[32..HEADER].try_into().unwrap();
+        Parts { version: [1, 0], fingerprint, sections: rows.map(section).collect() }
     }
 
     /// A section's bytes.
@@ -66,6 +68,7 @@ impl Parts {
         file[10..12].copy_from_slice(&self.version[1].to_le_bytes());
         file[12..16].copy_from_slice(&0x0102_0304_u32.to_le_bytes());
         file[24..28].copy_from_slice(&(self.sections.len() as u32).to_le_bytes());
+        file[32..HEADER].copy_from_slice(&self.fingerprint);
         for (i, section) in self.sections.iter().enumerate() {
             file.resize(file.len().next_multiple_of(64), 0);
             let row = HEADER + ROW * i;

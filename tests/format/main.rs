@@ -8,4 +8,5 @@ mod page;
 #[path = "../fuzz/probe/tree.rs"]
 mod probe;
 mod rules;
+mod scene;
 mod tables;

@@ -164,8 +164,12 @@ fn a_reader_from_the_page_reads_what_the_library_reads() {
     if !python() {
         return;
     }
-    let trees =
-        ["../fuzz/corpus/tree/still.ltree", "../fuzz/corpus/tree/forced.ltree", "golden.ltree"];
+    let trees = [
+        "../fuzz/corpus/tree/still.ltree",
+        "../fuzz/corpus/tree/forced.ltree",
+        "golden.ltree",
+        "textured.ltree",
+    ];
     for name in trees {
         let tree = pipeline::open_tree(&path(name), true).unwrap();
         read_in_python(&path(name)).unwrap().assert_is(&report(&tree));

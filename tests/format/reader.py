@@ -14,6 +14,7 @@ import zlib
 
 MAGIC = b"\x89LTR\r\n\x1a\n"
 KNOWN = {"META": 1, "TREE": 48, "GRUP": 256, "INST": 64, "FRAM": 16, "FORC": 4, "LGHT": 64, "PATH": 1}
+KNOWN |= {"TXTR": 40, "MEAN": 16}
 ALWAYS = ("TREE", "GRUP", "LGHT", "PATH")
 NO_TREE = 0xFFFFFFFF
 STILL = 1
@@ -147,6 +148,8 @@ class File:
         self.instances = [struct.unpack("<12f4I", r) for r in rows("INST", 64)]
         self.frames = [struct.unpack("<iIII", r) for r in rows("FRAM", 16)] if s.get("FRAM") else None
         self.forced = [entry for (entry,) in struct.iter_unpack("<I", s.get("FORC", b""))]
+        self.textures = [(r[:32], *struct.unpack("<2I", r[32:])) for r in rows("TXTR", 40)]
+        self.means = [struct.unpack("<I3f", r) for r in rows("MEAN", 16)]
         self.lights = []
         for r in rows("LGHT", 64):
             first, count, offset, length, energy, kind = struct.unpack_from("<4IfI", r, 32)
@@ -182,8 +185,22 @@ class File:
         require(len(emitters) + len(instances) == leaf_count, "TREE 5")
         return emitters, instances
 
+    def check_textures(self):
+        prints = [fingerprint for fingerprint, _, _ in self.textures]
+        require(prints == sorted(set(prints)), "TXTR 1")
+        behind = 0
+        for _, first, count in self.textures:
+            require(first == behind, "TXTR 2")
+            behind += count
+            triangles = [triangle for triangle, *_ in self.means[first:behind]]
+            require(triangles == sorted(set(triangles)), "MEAN 2")
+        require(behind == len(self.means), "TXTR 2")
+        for _, *mean in self.means:
+            require(all(math.isfinite(part) and part >= 0 for part in mean) and any(mean), "MEAN 1")
+
     def check(self):
-        """Every tree, and that it holds just its lights."""
+        """The textures; every tree, and that it holds just its lights."""
+        self.check_textures()
         groups = 0
         for row, (first, count, _leaves, kind, _root) in enumerate(self.trees):
             require(first == groups, "TREE 3")

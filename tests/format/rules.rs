@@ -63,8 +63,8 @@ impl Lane {
     }
 }
 
-fn broken(change: impl FnOnce(&mut Parts)) -> Option<Violation> {
-    let mut parts = Parts::of(&golden_bytes());
+fn broken(file: &[u8], change: impl FnOnce(&mut Parts)) -> Option<Violation> {
+    let mut parts = Parts::of(file);
     change(&mut parts);
     let file = parts.file();
     crate::probe::probe(file.as_ref());
@@ -77,7 +77,19 @@ struct Cases(Vec<Rule>);
 impl Cases {
     #[track_caller]
     fn breaks(&mut self, rule: &str, record: Record, change: impl FnOnce(&mut Parts)) {
-        let violation = broken(change).expect(rule);
+        self.breaks_of(&golden_bytes(), rule, record, change);
+    }
+
+    /// The same of another file than the golden one.
+    #[track_caller]
+    fn breaks_of(
+        &mut self,
+        file: &[u8],
+        rule: &str,
+        record: Record,
+        change: impl FnOnce(&mut Parts),
+    ) {
+        let violation = broken(file, change).expect(rule);
         assert_eq!((violation.rule.to_string().as_str(), violation.record), (rule, record));
         self.0.push(violation.rule);
     }
@@ -89,6 +101,7 @@ fn every_rule_is_asked_and_named_with_its_record() {
     rows_of_trees(&mut cases);
     groups(&mut cases);
     rows_of_the_rest(&mut cases);
+    textures(&mut cases);
     // Files so large are not made for a test.
     let excused = ["GRUP 1"];
     for rule in RULES[2..].concat() {
@@ -221,4 +234,24 @@ fn rows_of_the_rest(cases: &mut Cases) {
     });
     let last = golden().lights().len() - 1;
     cases.breaks("LGHT 7", Record::All, |p| p.set("LGHT", light(last, 36), 1 << 30));
+}
+
+fn textures(cases: &mut Cases) {
+    let whole = std::fs::read(crate::golden::path("textured.ltree")).unwrap();
+    let mut breaks = |rule: &str, record, change: &dyn Fn(&mut Parts)| {
+        cases.breaks_of(&whole, rule, record, change);
+    };
+    breaks("TXTR 1", Record::Row(1), &|p| {
+        let first = p.section("TXTR")[..32].to_vec();
+        p.section("TXTR")[40..72].copy_from_slice(&first);
+    });
+    breaks("TXTR 2", Record::Row(0), &|p| p.set("TXTR", 32, 1));
+    breaks("TXTR 2", Record::Row(1), &|p| p.set("TXTR", 40 + 36, u32::MAX));
+    breaks("TXTR 2", Record::All, &|p| p.set("TXTR", 40 + 36, 1));
+    breaks("TXTR 2", Record::All, &|p| p.sections.retain(|section| &section.name != b"TXTR"));
+    for value in [f32::NAN, f32::INFINITY, -1.0] {
+        breaks("MEAN 1", Record::Row(2), &|p| p.set("MEAN", 2 * 16 + 8, value.to_bits()));
+    }
+    breaks("MEAN 1", Record::Row(2), &|p| p.section("MEAN")[2 * 16 + 4..3 * 16].fill(0));
+    breaks("MEAN 2", Record::Row(1), &|p| p.set("MEAN", 16, 0));
 }

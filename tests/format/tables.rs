@@ -171,7 +171,9 @@ fn later_files_are_read_as_far_as_they_can_be() {
     // Sections nobody knows.
     assert_eq!(with(&|parts| parts.sections.insert(3, news(0))), Ok(()));
     assert_eq!(with(&|parts| parts.sections.insert(3, news(1))), refused("TABL 6"));
-    // Minor versions, later and (had there been one) earlier; another major.
+    // Minor versions, later and earlier; another major.
+    assert_eq!(with(&|parts| parts.version = [1, 0]), Ok(()));
+    assert_eq!(with(&|parts| parts.version = [1, 1]), Ok(()));
     assert_eq!(with(&|parts| parts.version = [1, 9]), Ok(()));
     assert_eq!(with(&|parts| parts.version = [2, 0]), refused("HEAD 3"));
     assert_eq!(with(&|parts| parts.version = [0, 9]), refused("HEAD 3"));
@@ -181,7 +183,7 @@ fn later_files_are_read_as_far_as_they_can_be() {
     assert_eq!(
         with(&|parts| {
             spare(parts);
-            parts.version = [1, 1];
+            parts.version = [1, 2];
         }),
         Ok(())
     );

@@ -7,6 +7,7 @@ mod fog;
 mod gltf;
 mod malformed;
 mod obj;
+mod open_exr;
 #[path = "../fuzz/probe/scene.rs"]
 mod probe;
 mod real;

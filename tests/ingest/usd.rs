@@ -2,7 +2,7 @@
 
 use crate::files;
 use crate::files::{File, lamp};
-use candelabra::scene::{LightKind, Pixels, Projection, Scene, Shaping, Timeline};
+use candelabra::scene::{LightKind, Pixels, Projection, Scene, Shaping, Timeline, Visibility};
 use glam::Vec3;
 use serde_json::json;
 use std::f32::consts::{FRAC_PI_3, FRAC_PI_6};
@@ -94,6 +94,36 @@ fn a_sun_has_an_angle() {
     });
     let sun = LightKind::Distant { irradiance_lux: Vec3::splat(100.0), angle_rad: FRAC_PI_6 };
     assert_eq!(scene.lights[0].kind, sun);
+}
+
+#[test]
+fn who_meets_a_light_follows_from_its_type_and_what_it_says() {
+    let of = |lux: serde_json::Value| {
+        let scene = load(|file| file.json["nodes"][0]["extras"] = json!({"usdLux": lux}));
+        let spheres = scene.lights.iter().map(|light| light.visibility);
+        let meshes = scene.instances.iter().map(|instance| instance.visibility);
+        let all: Vec<Visibility> = spheres.chain(meshes).collect();
+        assert_eq!(all.len(), 1);
+        all[0]
+    };
+    for kind in ["RectLight", "DiskLight", "CylinderLight"] {
+        assert_eq!(of(json!({"type": kind})), Visibility::LAMP);
+    }
+    assert_eq!(of(json!({"type": "SphereLight", "radius": 0.5})), Visibility::LAMP);
+    assert_eq!(of(json!({"type": "MeshLight"})), Visibility::ALL);
+    assert_eq!(load(|_| ()).instances[0].visibility, Visibility::ALL);
+    let seen = json!({"type": "RectLight", "visibility": {"camera": true}});
+    assert_eq!(of(seen), Visibility { camera: true, ..Visibility::LAMP });
+    let hidden =
+        json!({"type": "MeshLight", "visibility": {"reflections": false, "shadows": false}});
+    let camera_alone = Visibility { camera: true, reflections: false, shadows: false };
+    assert_eq!(of(hidden), camera_alone);
+    let dome = json!({"type": "DomeLight", "visibility": {"camera": false}});
+    let scene = load(|file| {
+        file.add("nodes", json!({"extras": {"usdLux": dome}}));
+        file.json["scenes"][0]["nodes"] = json!([0, 1]);
+    });
+    assert_eq!(scene.lights[0].visibility, Visibility { camera: false, ..Visibility::ALL });
 }
 
 #[test]

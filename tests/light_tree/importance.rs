@@ -83,6 +83,24 @@ fn a_point_obeys_the_inverse_square_and_the_cosine() {
     assert!(node.importance(&inside).is_finite() && node.importance(&inside) > 1e6);
 }
 
+/// A distance to a box is the difference of two large numbers where the box is large.
+#[test]
+fn a_lamp_within_reach_at_the_face_of_a_large_box_is_not_called_out_of_range() {
+    use candelabra::bounds::{Aabb, Cone};
+    for exponent in [-40, -20, 0, 20, 40] {
+        let size = 2f32.powi(exponent);
+        let aabb = Aabb { min: Vec3::new(-2.0 * size, 0.0, 0.0), max: Vec3::ZERO };
+        let range_m = 0.8 * f32::EPSILON * size;
+        let bounds = LightBounds { aabb, cone: Cone::ALL, energy: 1.0, range_m };
+        let node = Node::encode(&bounds, Link::Emitter(0));
+        let near = Vec3::X * 0.75 * f32::EPSILON * size;
+        let reached = node.importance(&Receiver { point: near, normal: Vec3::ZERO });
+        let beyond = node.importance(&Receiver { point: 1e3 * near, normal: Vec3::ZERO });
+        // Ranges end at 2^-31.75 m.
+        assert!(reached > 0.0 && (beyond == 0.0 || exponent < 0), "{exponent}: {reached} {beyond}");
+    }
+}
+
 /// Receivers placed along the edge of what a cluster can light, where rounding decides: for each the
 /// exact cosine beyond the cone is known, and light that is there is not called absent.
 #[test]

@@ -140,7 +140,14 @@ fn scene_of(prims: &[Prim]) -> Scene {
         let shaping = Shaping::Khr { inner_rad: 0.2, outer_rad: 0.7 };
         let forced = prim.forced;
         let mut light = |kind| {
-            scene.lights.push(Light { node, kind, values: values.clone(), range_m: None, forced })
+            scene.lights.push(Light {
+                node,
+                kind,
+                values: values.clone(),
+                range_m: None,
+                forced,
+                visibility: Default::default(),
+            })
         };
         let mesh = match prim.kind {
             Kind::Point => {
@@ -154,7 +161,15 @@ fn scene_of(prims: &[Prim]) -> Scene {
             Kind::Quad => 0,
             Kind::Fan => 1,
         };
-        scene.instances.push(Instance { path, node, mesh, values, shaping: None, forced });
+        scene.instances.push(Instance {
+            path,
+            node,
+            mesh,
+            values,
+            shaping: None,
+            forced,
+            visibility: Default::default(),
+        });
     }
     scene
 }

@@ -1,14 +1,16 @@
 //! Trees below trees: shared ones that are turned, mirrored and scaled, the one of what stands still
 //! below the one of a frame, and forced lights.
 
-use crate::city::{City, Part, city};
+use crate::city::{City, Part, Placed, city};
 use crate::support::{
     AnyViewer, Tree, any_viewer, can_light, dead_probability_in, for_viewer, receiver, tree_over,
 };
 use candelabra::bounds::{Aabb, Cone, LightBounds};
-use candelabra::light_tree::{FrameTree, Link, Receiver, TreeKind};
+use candelabra::light_tree::{
+    DistanceOnly, FrameTree, Link, Picked, Receiver, Scratch, Splitting, TreeKind,
+};
 use candelabra::math::random::hash;
-use glam::Vec3;
+use glam::{Affine3A, Vec3};
 use proptest::prelude::*;
 
 fn with_frame<T>(tree: &Tree, frame: i32, check: impl FnOnce(&FrameTree) -> T) -> T {
@@ -46,7 +48,74 @@ fn sharpened(city: &City) -> City {
     }
 }
 
+/// Whether a light without size is right where a viewer is.
+fn is_at(viewer: &AnyViewer, bounds: &LightBounds) -> bool {
+    let point = match viewer {
+        AnyViewer::Receiver(receiver) | AnyViewer::DistanceOnly(DistanceOnly(receiver)) => {
+            receiver.point
+        }
+        AnyViewer::Glossy(glossy) => glossy.receiver.point,
+        AnyViewer::Segment(_) => return false,
+    };
+    let apart = (point - bounds.aabb.center()).length();
+    apart <= 1e-5 * (1.0 + point.length()) && bounds.aabb.extent().length() <= apart
+}
+
+/// The same city with its shared lights stored otherwise: lengths in a unit that is `size` times as
+/// small, and energies `brighter` times as high as those at which the instances shine.
+fn stored_otherwise(city: &City, size: f32, brighter: f32) -> City {
+    let stored = |own: &LightBounds| LightBounds {
+        aabb: Aabb { min: own.aabb.min * size, max: own.aabb.max * size },
+        energy: own.energy * brighter,
+        range_m: own.range_m * size,
+        ..*own
+    };
+    let put = |placed: &Placed| Placed {
+        to_world: placed.to_world * Affine3A::from_scale(Vec3::splat(1.0 / size)),
+        brightness: placed.brightness / brighter,
+        ..*placed
+    };
+    let part = |part: &Part| Part {
+        flat: part.flat.clone(),
+        placed: part.placed.iter().map(put).collect(),
+    };
+    City {
+        shared: city.shared.iter().map(|all| all.iter().map(stored).collect()).collect(),
+        still: part(&city.still),
+        changing: part(&city.changing),
+        forced: city.forced.iter().map(put).collect(),
+    }
+}
+
 proptest! {
+    /// A mesh light may be stored in any unit, and built at a brightness at which no instance of it
+    /// ever shines: powers of two change no digit, so they change no decision, in no space.
+    #[test]
+    fn how_a_shared_light_is_stored_does_not_show_in_expected_counts(
+        city in city(), viewer in any_viewer(), size in -20i32..20, brighter in -60i32..60,
+        knob in prop_oneof![Just(0f32), Just(0.5), 0f32..1.0]
+    ) {
+        let other = stored_otherwise(&city, 2f32.powi(size), 2f32.powi(brighter));
+        let how = Splitting { knob, ..Splitting::NONE };
+        // Where a point light is at no distance at all, it has all of the light in any unit.
+        prop_assume!(!city.flattened().iter().any(|b| is_at(&viewer, b)));
+        let counts = |city: &City| {
+            let tree = city.tree();
+            with_frame(&tree, 1, |frame| {
+                let all = (0..frame.unforced_count()).map(Picked::Emitter);
+                for_viewer!(viewer, |viewer| {
+                    let mut scratch = Scratch::default();
+                    all.map(|light| frame.expected(&viewer, &[1.0], &how, light, &mut scratch))
+                        .collect::<Vec<f64>>()
+                })
+            })
+        };
+        let (a, b) = (counts(&city), counts(&other));
+        for (emitter, (a, b)) in a.iter().zip(&b).enumerate() {
+            prop_assert!((a - b).abs() <= 1e-6 * a.max(*b) + 1e-9, "{emitter}: {a} {b}");
+        }
+    }
+
     #[test]
     fn trees_below_trees_verify(city in city(), factors in prop::collection::vec(0.01f32..100.0, 5)) {
         prop_assert_eq!(city.tree().verify(), Ok(()));

@@ -2,6 +2,7 @@
 
 mod build;
 mod city;
+mod darkness;
 mod extremes;
 mod glossy;
 mod importance;

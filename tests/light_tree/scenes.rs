@@ -17,7 +17,14 @@ fn scene_with(lights: &[(LightKind, Trs)]) -> Scene {
         scene.nodes.push(Node::fixed(format!("/light_{i}"), None, *place));
         let kind = kind.clone();
         let node = i as u32;
-        scene.lights.push(Light { node, kind, values: None, range_m: None, forced: false });
+        scene.lights.push(Light {
+            node,
+            kind,
+            values: None,
+            range_m: None,
+            forced: false,
+            visibility: Default::default(),
+        });
     }
     scene
 }

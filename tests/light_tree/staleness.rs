@@ -65,7 +65,15 @@ fn street() -> Scene {
     for (path, mesh) in [("/wall", 0), ("/neon", 1), ("/lantern_a", 2), ("/lantern_b", 2)] {
         let (node, path) = (node(path), path.into());
         let (values, shaping) = (None, None);
-        scene.instances.push(Instance { path, node, mesh, values, shaping, forced: false });
+        scene.instances.push(Instance {
+            path,
+            node,
+            mesh,
+            values,
+            shaping,
+            forced: false,
+            visibility: Default::default(),
+        });
     }
     let intensity_cd = Vec3::new(1.0, 2.0, 3.0);
     let khr = Shaping::Khr { inner_rad: 0.2, outer_rad: 0.5 };
@@ -80,7 +88,14 @@ fn street() -> Scene {
         ("/sky", LightKind::Dome { radiance_nits: Vec3::ONE, texture: None }),
     ] {
         let node = node(path);
-        scene.lights.push(Light { node, kind, values: None, range_m: None, forced: false });
+        scene.lights.push(Light {
+            node,
+            kind,
+            values: None,
+            range_m: None,
+            forced: false,
+            visibility: Default::default(),
+        });
     }
     let eye = node("/eye");
     scene.cameras.push(Camera::perspective(eye, 0.8));
@@ -97,7 +112,7 @@ fn staleness(scene: &Scene) -> Option<StaleTree> {
     let survey = pipeline::survey(&street, &Emitters::collect(&street), &[1, 2, 3]).unwrap();
     let tree = LightTree::open(pipeline::build_tree(&survey)).unwrap();
     let emitters = Emitters::collect(scene);
-    match pipeline::check_fresh(&tree, Path::new("street.ltree"), scene, &emitters, &[]) {
+    match pipeline::check_fresh(&tree, Path::new("street.ltree"), scene, &emitters, &[], true) {
         Ok(()) => None,
         Err(TreeError::Stale { cause, .. }) => Some(cause),
         Err(other) => panic!("{other}"),

@@ -24,7 +24,14 @@ fn with_light(scene: &mut Scene) {
         scene.nodes.push(Node::fixed("/test_sky", None, Trs::default()));
         let kind = LightKind::Dome { radiance_nits: Vec3::ONE, texture: None };
         let node = scene.nodes.len() as u32 - 1;
-        scene.lights.push(Light { node, kind, values: None, range_m: None, forced: false });
+        scene.lights.push(Light {
+            node,
+            kind,
+            values: None,
+            range_m: None,
+            forced: false,
+            visibility: Default::default(),
+        });
     }
 }
 

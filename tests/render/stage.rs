@@ -118,7 +118,15 @@ impl Stage {
     pub fn again(&mut self, mesh: u32, node: u32) -> &mut Instance {
         let path = format!("/mesh_{}", self.scene.instances.len());
         let (values, shaping) = (None, None);
-        self.scene.instances.push(Instance { path, node, mesh, values, shaping, forced: false });
+        self.scene.instances.push(Instance {
+            path,
+            node,
+            mesh,
+            values,
+            shaping,
+            forced: false,
+            visibility: Default::default(),
+        });
         self.scene.instances.last_mut().unwrap()
     }
 
@@ -147,7 +155,14 @@ impl Stage {
     /// Puts a light at a new node.
     pub fn light(&mut self, kind: LightKind, place: Trs) -> &mut Light {
         let node = self.node(place);
-        self.scene.lights.push(Light { node, kind, values: None, range_m: None, forced: false });
+        self.scene.lights.push(Light {
+            node,
+            kind,
+            values: None,
+            range_m: None,
+            forced: false,
+            visibility: Default::default(),
+        });
         self.scene.lights.last_mut().unwrap()
     }
 

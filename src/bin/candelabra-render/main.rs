@@ -3,6 +3,8 @@
 mod arguments;
 mod progress;
 mod shot;
+#[path = "../candelabra/texture_bar.rs"]
+mod texture_bar;
 
 use arguments::Arguments;
 use candelabra::pipeline::{TreeError, ViewError};
@@ -44,5 +46,6 @@ fn is_usage(error: &anyhow::Error) -> bool {
 
 /// Whether the tree file itself is at fault; not one that is absent.
 fn is_bad_tree(error: &anyhow::Error) -> bool {
-    matches!(error.downcast_ref(), Some(TreeError::Broken { .. } | TreeError::Stale { .. }))
+    use TreeError::{Broken, Contradicts, Stale};
+    matches!(error.downcast_ref(), Some(Broken { .. } | Stale { .. } | Contradicts { .. }))
 }

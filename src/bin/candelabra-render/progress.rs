@@ -18,6 +18,12 @@ impl Bar {
         Bar(bar)
     }
 
+    /// Says that rays are being prepared.
+    pub fn preparing(&self) {
+        self.0.set_message("preparing rays");
+        self.0.tick();
+    }
+
     /// Says which frame is being rendered.
     pub fn frame(&self, frame: i32) {
         self.0.set_message(format!("frame {frame}"));

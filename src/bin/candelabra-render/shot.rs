@@ -2,10 +2,11 @@
 
 use crate::arguments::Arguments;
 use crate::progress::Bar;
+use crate::texture_bar::TextureBar;
 use anyhow::{Context, Result, bail};
 use candelabra::emitter::Emitters;
 use candelabra::light_tree::{ALGORITHM_VERSION, LightTree};
-use candelabra::pipeline;
+use candelabra::pipeline::{self, OpenedTree};
 use candelabra::render::exr::{ExrOptions, read_metadata, write_exr};
 use candelabra::render::frames::Frames;
 use candelabra::render::png::{exposure_for, write_png};
@@ -50,14 +51,17 @@ pub fn render(arguments: &Arguments) -> Result<usize> {
     }
     let camera = look.camera;
     refuse_to_overwrite(arguments, &scene, &frames)?;
-    let emitters = Emitters::collect(&scene);
     match &arguments.tree {
         Some(path) => {
-            let tree = pipeline::open_tree(path, !arguments.no_verify)?;
-            pipeline::check_fresh(&tree, path, &scene, &emitters, &arguments.force_light)?;
+            let verify = !arguments.no_verify;
+            let tree = pipeline::open_tree(path, verify)?;
+            let emitters = collect(&scene, Some(&tree));
+            let forced = &arguments.force_light;
+            pipeline::check_fresh(&tree, path, &scene, &emitters, forced, verify)?;
             render_frames(arguments, &scene, &emitters, &tree, camera, &frames)
         }
         None => {
+            let emitters = collect(&scene, None);
             let mut ascending = frames.as_slice().to_vec();
             ascending.sort_unstable();
             let survey = pipeline::survey(&scene, &emitters, &ascending)?;
@@ -66,6 +70,12 @@ pub fn render(arguments: &Arguments) -> Result<usize> {
             render_frames(arguments, &scene, &emitters, &tree, camera, &frames)
         }
     }
+}
+
+/// The emitters of a scene, with a bar where that lasts.
+fn collect(scene: &Scene, tree: Option<&OpenedTree>) -> Emitters {
+    let bar = TextureBar::new();
+    pipeline::collect_emitters(scene, tree, &|done, all| bar.show(done, all))
 }
 
 /// No picture may replace what it is rendered from.
@@ -126,6 +136,8 @@ struct Stamp {
     camera: serde_json::Value,
 }
 
+/// Preparations that take less, in seconds, are not worth a line.
+const LEAST_TOLD_S: f64 = 0.1;
 const SOFTWARE: &str = concat!("candelabra-render ", env!("CARGO_PKG_VERSION"));
 
 impl Stamp {
@@ -190,12 +202,25 @@ fn render_frames<D: AsRef<[u8]> + Sync>(
             bar.skip(height);
             continue;
         }
-        bar.frame(frame);
         let rendered =
             check_outputs(arguments, frame).map_err(anyhow::Error::from).and_then(|()| {
                 let delegate = delegate.get_or_insert_with(|| {
-                    RenderDelegate::new(scene, emitters, tree, camera.clone(), settings.clone())
+                    bar.preparing();
+                    let started = Instant::now();
+                    let delegate = RenderDelegate::new(
+                        scene,
+                        emitters,
+                        tree,
+                        camera.clone(),
+                        settings.clone(),
+                    );
+                    let seconds = started.elapsed().as_secs_f64();
+                    if seconds >= LEAST_TOLD_S {
+                        bar.line(&format!("rays prepared in {seconds:.2} s"));
+                    }
+                    delegate
                 });
+                bar.frame(frame);
                 render_frame(delegate, arguments, &stamp, &path, &bar, &mut exposure)
             });
         match rendered {

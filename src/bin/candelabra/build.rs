@@ -1,11 +1,13 @@
 //! `candelabra build`: a scene in, a tree file out.
 
+use crate::texture_bar::TextureBar;
 use anyhow::{Context, Result, bail};
 use candelabra::emitter::Emitters;
 use candelabra::light_tree::LightTree;
 use candelabra::page::counted;
-use candelabra::pipeline::{self, OpenedTree, Rebuilt, Survey, TreeError};
+use candelabra::pipeline::{self, OpenedTree, Rebuilt, Standing, Survey, TreeError};
 use candelabra::render::frames::Frames;
+use candelabra::scene::Scene;
 use candelabra::store::{AlignedBytes, check_writable, write_atomically};
 use clap::Args;
 use std::io::Write;
@@ -40,6 +42,7 @@ pub struct Arguments {
 }
 
 pub fn run(arguments: &Arguments) -> Result<()> {
+    let started = Instant::now();
     if let Some(threads) = arguments.threads {
         rayon::ThreadPoolBuilder::new().num_threads(threads.into()).build_global()?;
     }
@@ -51,8 +54,8 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let mut out = std::io::stdout().lock();
 
     let load = || {
-        let started = Instant::now();
-        pipeline::load_scene(&arguments.scene).map(|scene| (scene, started.elapsed()))
+        let (loaded, loading) = timed(|| pipeline::load_scene(&arguments.scene));
+        loaded.map(|scene| (scene, loading))
     };
     // While the scene is read, the output as it is and the base are verified.
     let open = || {
@@ -61,8 +64,8 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     };
     let (loaded, (before, base)) = rayon::join(load, open);
     let (mut scene, loading) = loaded?;
-    pipeline::force_lights(&mut scene, &arguments.force_light)
-        .with_context(|| arguments.scene.display().to_string())?;
+    let named = || arguments.scene.display().to_string();
+    pipeline::force_lights(&mut scene, &arguments.force_light).with_context(named)?;
     for note in &scene.notes {
         eprintln!("note: {note}");
     }
@@ -70,7 +73,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     if scene.files.iter().any(|input| real(input).is_some() && real(input) == real(&output)) {
         bail!("{}: is the scene's own file; choose another output", output.display());
     }
-    let emitters = Emitters::collect(&scene);
+    let (emitters, collecting) = timed(|| collect(&scene));
     let frames = match &arguments.frames {
         Some(frames) => {
             let mut frames = frames.as_slice().to_vec();
@@ -79,8 +82,8 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         }
         None => pipeline::frames_of(&scene),
     };
-    let survey = pipeline::survey(&scene, &emitters, &frames)
-        .with_context(|| arguments.scene.display().to_string())?;
+    let (survey, surveying) = timed(|| pipeline::survey(&scene, &emitters, &frames));
+    let survey = survey.with_context(named)?;
     writeln!(
         out,
         "{}: {}, {} ({} change), read in {}",
@@ -90,10 +93,19 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         emitters.changing_count(),
         Seconds(loading),
     )?;
-    if before.as_ref().is_some_and(|before| pipeline::is_built_from(&before.tree, &survey)) {
-        writeln!(out, "{}: up to date", output.display())?;
-        return Ok(());
-    }
+    let before = match before.map(|before| (pipeline::standing(&before.tree, &survey), before)) {
+        Some((Standing::UpToDate, _)) => {
+            writeln!(out, "{}: up to date", output.display())?;
+            return Ok(());
+        }
+        Some((Standing::Contradicts(what), before)) => {
+            let path = before.path.display();
+            eprintln!("note: {path}: contradicts the scene: {what}; built from the scene alone");
+            None
+        }
+        Some((Standing::OutOfDate, before)) => Some(before),
+        None => None,
+    };
     check_writable(&output)?;
     let base = match base {
         None => before,
@@ -103,22 +115,84 @@ pub fn run(arguments: &Arguments) -> Result<()> {
             None
         }
     };
-    let mut times = Times::default();
-    let bytes = build(&survey, base, &mut times, &mut out)?;
-    let started = Instant::now();
-    // What is about to replace a good file must be one.
-    let tree = LightTree::open(bytes).and_then(|tree| tree.verify().map(|()| tree));
-    let bytes = tree.with_context(|| format!("{}: not written", output.display()))?.into_bytes();
-    write_atomically(&output, |file| file.write_all(bytes.as_ref()))?;
-    times.writing = started.elapsed();
-
-    let started = Instant::now();
-    pipeline::open_tree(&output, true)?;
-    times.opening = started.elapsed();
-    let size = bytes.as_ref().len();
+    let (built, building) = timed(|| build(&survey, base, &mut out));
+    let Built { bytes, is_partial } = built?;
+    let (written, writing) = timed(|| {
+        // What is about to replace a good file must be one.
+        let tree = LightTree::open(bytes).and_then(|tree| tree.verify().map(|()| tree));
+        let tree = tree.with_context(|| format!("{}: not written", output.display()))?;
+        let bytes = tree.into_bytes();
+        write_atomically(&output, |file| file.write_all(bytes.as_ref()))?;
+        anyhow::Ok(bytes.as_ref().len())
+    });
+    let size = written?;
     let each = size as f64 / emitters.len().max(1) as f64;
     writeln!(out, "{}: {size} bytes, {each:.1} an emitter", output.display())?;
-    times.report(&mut out)?;
+    writeln!(
+        out,
+        "emitters found in {}, surveyed in {}, trees built in {}, written in {}",
+        Seconds(collecting),
+        Seconds(surveying),
+        Seconds(building),
+        Seconds(writing)
+    )?;
+    if is_partial {
+        return Ok(());
+    }
+    let with = with_file(arguments, &scene, &output)?;
+    let without = match survey.frames.len() {
+        0 | 1 => collecting + surveying + building,
+        _ => collecting + without_file(&scene, &emitters, frames[0])?,
+    };
+    report(&mut out, started.elapsed(), without, with)
+}
+
+fn timed<T>(work: impl FnOnce() -> T) -> (T, Duration) {
+    let started = Instant::now();
+    let done = work();
+    (done, started.elapsed())
+}
+
+/// The emitters of a scene, nothing of them taken from a file, with a bar where that lasts.
+fn collect(scene: &Scene) -> Emitters {
+    let bar = TextureBar::new();
+    pipeline::collect_emitters(scene, None::<&OpenedTree>, &|done, all| bar.show(done, all))
+}
+
+/// What a process spends that renders with the file, between reading the scene and its first frame.
+fn with_file(arguments: &Arguments, scene: &Scene, output: &Path) -> Result<Duration> {
+    let (checked, with) = timed(|| {
+        let tree = pipeline::open_tree(output, true)?;
+        let emitters = pipeline::collect_emitters(scene, Some(&tree), &|_, _| {});
+        pipeline::check_fresh(&tree, output, scene, &emitters, &arguments.force_light, true)
+    });
+    checked?;
+    Ok(with)
+}
+
+/// What a process spends on the tree of one frame.
+fn without_file(scene: &Scene, emitters: &Emitters, frame: i32) -> Result<Duration> {
+    let (survey, surveying) = timed(|| pipeline::survey(scene, emitters, &[frame]));
+    let survey = survey?;
+    let (_, building) = timed(|| pipeline::build_tree(&survey));
+    Ok(surveying + building)
+}
+
+/// When the file has paid for itself, by what this process has taken and what others will.
+fn report(out: &mut impl Write, made: Duration, without: Duration, with: Duration) -> Result<()> {
+    write!(
+        out,
+        "before its first frame a process spends {} on lights without the file, {} with it",
+        Seconds(without),
+        Seconds(with)
+    )?;
+    match without.checked_sub(with) {
+        Some(saved) if !saved.is_zero() => {
+            let processes = (made.as_secs_f64() / saved.as_secs_f64()).ceil().max(1.0);
+            writeln!(out, ": the file has paid for itself with process number {processes:.0}")?;
+        }
+        _ => writeln!(out, ": the file saves no time and serves as a record")?,
+    }
     Ok(())
 }
 
@@ -131,75 +205,35 @@ struct Base {
 
 impl Base {
     fn open(path: &Path) -> Result<Base, TreeError> {
-        let started = Instant::now();
-        let tree = pipeline::open_base(path)?;
-        Ok(Base { path: path.into(), tree, opening: started.elapsed() })
+        let (tree, opening) = timed(|| pipeline::open_base(path));
+        Ok(Base { path: path.into(), tree: tree?, opening })
     }
 }
 
-fn build(
-    survey: &Survey,
-    base: Option<Base>,
-    times: &mut Times,
-    out: &mut impl Write,
-) -> Result<AlignedBytes> {
-    let started = Instant::now();
-    let Some(Base { path, tree, opening }) = base else {
-        let bytes = pipeline::build_tree(survey);
-        times.building = started.elapsed();
-        return Ok(bytes);
-    };
-    let rebuilt = pipeline::rebuild_tree(survey, &tree);
-    times.building = started.elapsed();
-    let Rebuilt { bytes, reused, leaves } = rebuilt;
-    writeln!(
-        out,
-        "{}: {reused} of {leaves} leaves taken over, opened and verified in {}",
-        path.display(),
-        Seconds(opening)
-    )?;
-    times.is_partial = reused > 0;
-    Ok(bytes)
-}
-
-/// What it took to make the file, and what it takes to use it.
-#[derive(Default)]
-struct Times {
-    building: Duration,
-    /// Verifying, writing and syncing.
-    writing: Duration,
-    /// Opening and verifying.
-    opening: Duration,
-    /// Whether part of the tree was taken over from a base.
+/// The bytes of a file, and whether part of it was taken over from a base.
+struct Built {
+    bytes: AlignedBytes,
     is_partial: bool,
 }
 
-impl Times {
-    fn report(&self, out: &mut impl Write) -> Result<()> {
-        let Times { building, writing, opening, is_partial } = *self;
-        write!(
+fn build(survey: &Survey, base: Option<Base>, out: &mut impl Write) -> Result<Built> {
+    let Some(Base { path, tree, opening }) = base else {
+        return Ok(Built { bytes: pipeline::build_tree(survey), is_partial: false });
+    };
+    let Rebuilt { bytes, reused, leaves, base_contradicts } = pipeline::rebuild_tree(survey, &tree);
+    let path = path.display();
+    if base_contradicts {
+        eprintln!(
+            "note: not built upon {path}: it contradicts the scene in lights that have not changed"
+        );
+    } else {
+        writeln!(
             out,
-            "built in {}, written in {}, opens and verifies in {}",
-            Seconds(building),
-            Seconds(writing),
+            "{path}: {reused} of {leaves} leaves taken over, opened and verified in {}",
             Seconds(opening)
         )?;
-        // Every process that builds its own tree spends `building`; with the file, `opening`.
-        match building.checked_sub(opening) {
-            _ if is_partial => writeln!(out)?,
-            Some(saved) if !saved.is_zero() => {
-                let made = building + writing;
-                let processes = (made.as_secs_f64() / saved.as_secs_f64()).ceil().max(1.0);
-                writeln!(
-                    out,
-                    "; a process that opens it saves {}: the file has paid for itself with process number {processes:.0}",
-                    Seconds(saved)
-                )?;
-            }
-            _ => writeln!(out, "; building anew is as fast as opening: the file pays as a record")?,
-        }
-        Ok(())
     }
+    Ok(Built { bytes, is_partial: reused > 0 })
 }
 
 /// A duration with three digits.

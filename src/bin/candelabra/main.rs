@@ -7,6 +7,7 @@ mod measure;
 mod page;
 mod race;
 mod shot;
+mod texture_bar;
 mod verify;
 
 use candelabra::pipeline::ViewError;

@@ -1,15 +1,18 @@
 //! `candelabra verify`: whether tree files are what the format says.
 
-use anyhow::Result;
+use crate::texture_bar::TextureBar;
+use anyhow::{Context, Result};
+use candelabra::emitter::Emitters;
 use candelabra::page::counted;
 use candelabra::pipeline::{self, OpenedTree, TreeError};
+use candelabra::scene::Scene;
 use candelabra::store::StoreError;
 use clap::Args;
 use std::io::Write;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-/// A file breaks a rule.
+/// A file breaks a rule, or does not belong to the scene.
 const UNSOUND: u8 = 1;
 /// A file cannot be read; also what clap says of usage.
 const TROUBLE: u8 = 2;
@@ -17,24 +20,70 @@ const TROUBLE: u8 = 2;
 #[derive(Args)]
 #[command(
     after_help = "Exit codes: 0 all files are sound, 1 a file is not, 2 a file cannot be read.\n\
-    Rules are numbered as in the specification of the format, src/store/format.md."
+    Rules are numbered as in the specification of the format, src/store/format.md.\n\
+    A sound tree keeps its promises about its own leaves. That the leaves bound the lights of a scene,\n\
+    only --scene shows: it integrates textures anew and compares every leaf."
 )]
 pub struct Arguments {
     /// Tree files
     #[arg(required = true)]
     files: Vec<PathBuf>,
+    /// The scene that the trees belong to: each leaf is compared with its light
+    #[arg(long, value_name = "FILE")]
+    scene: Option<PathBuf>,
+    /// As given to build; may be given again
+    #[arg(long, value_name = "PATH", requires = "scene")]
+    force_light: Vec<String>,
+}
+
+/// The scene that trees are held against.
+struct Owner {
+    scene: Scene,
+    emitters: Emitters,
+    forced: Vec<String>,
+}
+
+impl Owner {
+    fn load(path: &Path, forced: &[String]) -> Result<Owner> {
+        let mut scene = pipeline::load_scene(path)?;
+        pipeline::force_lights(&mut scene, forced).with_context(|| path.display().to_string())?;
+        let bar = TextureBar::new();
+        let watch = |done, all| bar.show(done, all);
+        let emitters = pipeline::collect_emitters(&scene, None::<&OpenedTree>, &watch);
+        Ok(Owner { scene, emitters, forced: forced.to_vec() })
+    }
 }
 
 /// Checks each file and says of each what it is, whatever the others are. The worst decides the code.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let mut out = std::io::stdout().lock();
+    let owner = match &arguments.scene {
+        None => None,
+        Some(path) => match Owner::load(path, &arguments.force_light) {
+            Ok(owner) => Some(owner),
+            Err(error) => {
+                eprintln!("candelabra: {error:#}");
+                return Ok(ExitCode::from(TROUBLE));
+            }
+        },
+    };
     let mut worst = 0;
     for file in &arguments.files {
         let name = file.display();
         worst = worst.max(match pipeline::open_tree(file, true) {
             Ok(tree) => {
                 writeln!(out, "{name}: sound: {}", summary(&tree))?;
-                0
+                match owner.as_ref().map(|owner| belongs(&tree, file, owner)) {
+                    None => 0,
+                    Some(Ok(())) => {
+                        writeln!(out, "{name}: every leaf is what the scene gives")?;
+                        0
+                    }
+                    Some(Err(error)) => {
+                        writeln!(out, "{error}")?;
+                        UNSOUND
+                    }
+                }
             }
             Err(TreeError::Broken { cause, .. }) => {
                 match cause {
@@ -52,6 +101,11 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
         });
     }
     Ok(ExitCode::from(worst))
+}
+
+fn belongs(tree: &OpenedTree, file: &Path, owner: &Owner) -> Result<(), TreeError> {
+    let Owner { scene, emitters, forced } = owner;
+    pipeline::check_fresh(tree, file, scene, emitters, forced, true)
 }
 
 fn summary(tree: &OpenedTree) -> String {

@@ -6,7 +6,7 @@ use super::lights::{self, Placed};
 use super::{Output, Source, animation, cameras, fog, instancing};
 use crate::ingest::error::Fault;
 use crate::ingest::paths::{PrimPaths, component};
-use crate::scene::{Channel, Instance, Light, Node, Shaping, Trs};
+use crate::scene::{Channel, Instance, Light, Node, Trs};
 use glam::{DAffine3, DMat4, DQuat, DVec3};
 use gltf::json::{Index, Mesh, Node as Row};
 
@@ -116,6 +116,7 @@ impl Walk<'_> {
 
     fn push(&mut self, output: &mut Output, mut node: Node) -> Result<u32, Fault> {
         node.path = self.paths.claim(node.path);
+        node.settle();
         let bytes = size_of::<Node>() + 2 * node.path.len();
         output.budget.take(bytes as u64, || "nodes".to_string())?;
         let above = node.parent.is_none_or(|parent| self.uniform[parent as usize]);
@@ -153,7 +154,8 @@ impl Walk<'_> {
             return Ok(());
         };
         let (lux, values) = (lux.as_ref(), values.as_ref());
-        let placed = Placed { lux, shaping, values, forced, has_light, object };
+        let visibility = lights::visibility(lux);
+        let placed = Placed { lux, shaping, values, forced, visibility, has_light, object };
         let Some(instances) = instances else {
             return self.put_mesh(output, mesh, node, &placed);
         };
@@ -206,7 +208,7 @@ impl Walk<'_> {
                 None if placed.has_light => self.paths.claim(format!("{above}/mesh")),
                 None => above,
             };
-            let (shaping, forced): (Option<Shaping>, bool) = (placed.shaping, placed.forced);
+            let Placed { shaping, forced, visibility, .. } = *placed;
             let bytes = size_of::<Instance>() + 2 * path.len();
             output.budget.take(bytes as u64, || placed.object.to_string())?;
             let values = placed.copy_values(output)?;
@@ -215,7 +217,8 @@ impl Walk<'_> {
                     .notes
                     .add(placed.object, "its light varies, but its mesh has no material; dark");
             }
-            output.scene.instances.push(Instance { path, node, mesh, values, shaping, forced });
+            let lit = Instance { path, node, mesh, values, shaping, forced, visibility };
+            output.scene.instances.push(lit);
         }
         Ok(())
     }

@@ -5,7 +5,9 @@ use super::{Output, Source};
 use crate::ingest::error::Fault;
 use crate::ingest::image::{self, Coding};
 use crate::math::color::Rgb;
-use crate::scene::{Interpolation, Keys, Light, LightKind, Material, Shaping, Texture, Wrap};
+use crate::scene::{
+    Interpolation, Keys, Light, LightKind, Material, Shaping, Texture, Visibility, Wrap,
+};
 use gltf::json::extensions::scene::khr_lights_punctual::{Light as Row, Type};
 use gltf::json::validation::Checked;
 
@@ -20,6 +22,7 @@ pub(super) struct Placed<'a> {
     /// Of the node's light, unless that is no mesh.
     pub values: Option<&'a Keys<Rgb>>,
     pub forced: bool,
+    pub visibility: Visibility,
     /// Whether a light has the node's path already.
     pub has_light: bool,
     pub object: &'a str,
@@ -56,8 +59,9 @@ pub(super) fn of_node(
     node: u32,
     object: &str,
 ) -> Result<Option<Light>, Fault> {
-    let forced = lux.is_some_and(|lux| lux.force);
-    let light = |kind, range_m| Some(Light { node, kind, values: None, range_m, forced });
+    let (forced, visibility) = (lux.is_some_and(|lux| lux.force), visibility(lux));
+    let light =
+        |kind, range_m| Some(Light { node, kind, values: None, range_m, forced, visibility });
     if let Some(lux) = lux.filter(|lux| lux.kind == "DomeLight") {
         return Ok(light(dome(source, output, lux, object)?, None));
     }
@@ -107,7 +111,8 @@ fn strength(row: &Row, object: &str) -> Result<Rgb, Fault> {
     }
 }
 
-/// The strength over time that `extras.usdLux` gives, in the light's own unit.
+/// The strength over time that `extras.usdLux` gives, in the light's own unit. One key if it is
+/// constant.
 pub(super) fn values(lux: Option<&UsdLux>, object: &str) -> Result<Option<Keys<Rgb>>, Fault> {
     let Some(UsdValues { times, rgb }) = lux.and_then(|lux| lux.values.as_ref()) else {
         return Ok(None);
@@ -128,7 +133,7 @@ pub(super) fn values(lux: Option<&UsdLux>, object: &str) -> Result<Option<Keys<R
     if values.iter().any(|value| value.min_element() < 0.0) {
         return fault("an rgb value is negative".into());
     }
-    Ok(Some(Keys { times_s, values, interpolation: Interpolation::Linear }))
+    Ok(Some(Keys { times_s, values, interpolation: Interpolation::Linear }.settled()))
 }
 
 /// The emission profile that `extras.usdLux` gives.
@@ -153,7 +158,22 @@ pub(super) fn shaping(lux: Option<&UsdLux>, object: &str) -> Result<Option<Shapi
 pub(super) fn sphere(material: &Material, radius: f32, node: u32, placed: &Placed) -> Light {
     let radiance_nits = material.emission_nits;
     let kind = LightKind::Sphere { radiance_nits, radius, shaping: placed.shaping };
-    Light { node, kind, values: None, range_m: None, forced: placed.forced }
+    let Placed { forced, visibility, .. } = *placed;
+    Light { node, kind, values: None, range_m: None, forced, visibility }
+}
+
+/// Which rays meet the light at a node: by its type, and by what the node says itself.
+pub(super) fn visibility(lux: Option<&UsdLux>) -> Visibility {
+    let Some(UsdLux { kind, visibility, .. }) = lux else { return Visibility::ALL };
+    let usual = match kind.as_str() {
+        "RectLight" | "DiskLight" | "SphereLight" | "CylinderLight" => Visibility::LAMP,
+        _ => Visibility::ALL,
+    };
+    Visibility {
+        camera: visibility.camera.unwrap_or(usual.camera),
+        reflections: visibility.reflections.unwrap_or(usual.reflections),
+        shadows: visibility.shadows.unwrap_or(usual.shadows),
+    }
 }
 
 fn dome(

@@ -14,7 +14,7 @@ use super::normals;
 use super::notes::Notes;
 use super::paths::{PrimPaths, component};
 use super::uri::Folder;
-use crate::scene::{Instance, Mesh, Node, Scene, Trs};
+use crate::scene::{Instance, Mesh, Node, Scene, Trs, Visibility};
 use glam::{Vec2, Vec3, Vec4};
 use materials::Materials;
 use std::cell::RefCell;
@@ -66,8 +66,15 @@ pub(super) fn load(path: &Path) -> Result<Scene, Fault> {
         scene.nodes.push(Node::fixed(path.clone(), None, Trs::default()));
         let mesh_index = scene.meshes.len() as u32;
         scene.meshes.push(mesh);
-        let instance =
-            Instance { path, node, mesh: mesh_index, values: None, shaping: None, forced: false };
+        let instance = Instance {
+            path,
+            node,
+            mesh: mesh_index,
+            values: None,
+            shaping: None,
+            forced: false,
+            visibility: Visibility::ALL,
+        };
         scene.instances.push(instance);
     }
     if scene.meshes.is_empty() {

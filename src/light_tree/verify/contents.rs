@@ -71,11 +71,16 @@ impl<D: AsRef<[u8]> + Sync> LightTree<D> {
             usize::from(kind == Some(TreeKind::Frame) && self.still_tree().is_some());
         placed.sort_unstable();
         let expected = match kind {
-            Some(TreeKind::Still) => self.lights_of_class(LightRow::PLACED),
-            Some(TreeKind::Frame) => self.lights_of_class(LightRow::CHANGES | LightRow::PLACED),
-            _ => Vec::new(),
+            Some(TreeKind::Still) => self.lights_of(LightRow::PLACED..LightRow::CHANGES),
+            Some(TreeKind::Frame) => {
+                let placed = LightRow::CHANGES | LightRow::PLACED;
+                self.lights_of(placed..placed + 1)
+            }
+            _ => &[],
         };
-        let holds = (emitters, below) == (own.len(), expected_below) && placed == expected;
+        let expected = expected.iter().map(|light| (light.first_emitter, light.emitter_count));
+        let holds =
+            (emitters, below) == (own.len(), expected_below) && placed.into_iter().eq(expected);
         check(holds, rules::TREE_HOLDS_ITS_LIGHTS, row)
     }
 

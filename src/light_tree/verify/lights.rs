@@ -5,6 +5,7 @@ use crate::light_tree::group::WIDTH;
 use crate::light_tree::node::MOST;
 use crate::light_tree::records::{FrameRow, LightRow, NO_TREE, TreeKind};
 use crate::light_tree::tree::LightTree;
+use std::ops::Range;
 
 /// The number of the emitter behind a light's.
 fn next_emitter(light: &LightRow) -> u64 {
@@ -40,18 +41,19 @@ impl<D: AsRef<[u8]> + Sync> LightTree<D> {
         check(ascends, rules::LIGHTS_ARE_IN_ORDER, row)
     }
 
-    /// First emitter and count of the lights of a class.
-    pub(super) fn lights_of_class(&self, class: u32) -> Vec<(u32, u32)> {
-        let lights = self.lights().iter().filter(|light| light.class == class);
-        lights.map(|light| (light.first_emitter, light.emitter_count)).collect()
+    /// The lights of some classes, which stand together.
+    pub(super) fn lights_of(&self, classes: Range<u32>) -> &[LightRow] {
+        let lights = self.lights();
+        let [from, to] = [classes.start, classes.end]
+            .map(|class| lights.partition_point(|light| light.class < class));
+        &lights[from..to]
     }
 
     /// The frames' rows, and the entries of forced lights that they, or the file, have.
     pub(super) fn verify_frames(&self) -> Checked {
         let kind_of = |row: u32| self.trees().get(row as usize).and_then(TreeKind::of);
         let has_still = self.still_tree().is_some();
-        let changes = [LightRow::CHANGES, LightRow::CHANGES | LightRow::PLACED];
-        let any_changes = self.lights().iter().any(|light| changes.contains(&light.class));
+        let any_changes = !self.lights_of(LightRow::CHANGES..LightRow::FORCED).is_empty();
         let mut before = None;
         let mut next_forced = 0_u64;
         for (row, &FrameRow { frame, tree, first_forced, forced_count }) in
@@ -79,8 +81,8 @@ impl<D: AsRef<[u8]> + Sync> LightTree<D> {
     }
 
     /// A run of forced lights: all there are, in order.
-    fn verify_forced(&self, run: std::ops::Range<usize>) -> Checked {
-        let mut lights = self.lights().iter().filter(|light| light.is(LightRow::FORCED));
+    fn verify_forced(&self, run: Range<usize>) -> Checked {
+        let mut lights = self.lights_of(LightRow::FORCED..2 * LightRow::FORCED).iter();
         for entry in run.clone() {
             let instance = self.instances().get(self.forced()[entry] as usize);
             let placed = instance

@@ -5,6 +5,7 @@ mod contents;
 mod groups;
 mod lights;
 pub(super) mod rules;
+mod textures;
 mod walkable;
 
 use super::group::WIDTH;
@@ -56,7 +57,8 @@ impl<D: AsRef<[u8]> + Sync> LightTree<D> {
 
     fn verify_rules(&self) -> Checked {
         let trees = || self.verify_trees().and_then(|()| self.verify_instances());
-        let (lights, trees) = rayon::join(|| self.verify_lights(), trees);
+        let rows = || self.verify_lights().and_then(|()| self.verify_textures());
+        let (lights, trees) = rayon::join(rows, trees);
         lights?;
         trees?;
         let whole = |row, tree: &TreeRow, seen: &mut Vec<u32>| {

@@ -5,7 +5,7 @@ use crate::light_tree::records;
 use crate::store::{RULES_OF_HEADER, RULES_OF_TABLE, Rule, rules};
 
 /// All rules that a tree file keeps, part by part.
-pub const RULES: [&[Rule]; 8] = [
+pub const RULES: [&[Rule]; 10] = [
     RULES_OF_HEADER,
     RULES_OF_TABLE,
     OF_TREES,
@@ -14,6 +14,8 @@ pub const RULES: [&[Rule]; 8] = [
     OF_FRAMES,
     OF_FORCED,
     OF_LIGHTS,
+    OF_TEXTURES,
+    OF_MEANS,
 ];
 
 rules! {
@@ -74,5 +76,17 @@ rules! {
     LIGHT_ENERGY_IS_A_NUMBER = "its energy is finite and not negative";
     PATH_IS_TEXT = "its path is UTF-8 inside PATH, and not empty";
     LIGHTS_ARE_IN_ORDER = "lights are in order of class and then of path, no two alike";
-    EMITTERS_ARE_NUMBERED = "there are fewer than 2^30 emitters, of class 0 no more than lanes";
+    EMITTERS_ARE_NUMBERED = "there are fewer than 2^30 emitters; those of class 0 are no more than the lanes of all groups";
+}
+
+rules! {
+    records::TEXTURES, OF_TEXTURES:
+    FINGERPRINTS_ASCEND = "fingerprints ascend";
+    TEXTURES_USE_THE_MEANS = "its means follow those of the row before it; together they are all of MEAN";
+}
+
+rules! {
+    records::MEANS, OF_MEANS:
+    MEAN_IS_LIGHT = "the mean is finite, not negative and not black";
+    TRIANGLES_ASCEND = "the triangles of one row of TXTR ascend";
 }

@@ -7,11 +7,13 @@ use crate::light_tree::records::{TreeKind, TreeRow};
 use crate::light_tree::tree::LightTree;
 
 impl<D: AsRef<[u8]>> LightTree<D> {
-    /// Whether links form trees: every group is reached once, shared trees hold no others, and the tree of
-    /// a frame holds that of what stands still at most once.
+    /// Whether links form trees: every group is reached once, shared trees hold no others, the tree of a
+    /// frame holds that of what stands still at most once, and the trees that one tree places do not
+    /// have more groups, counted as often as they are placed, than the file has groups and emitters.
     ///
     /// Links that merely lead onwards would end every walk. But where many lead to one group, and from
-    /// there again, there are more ways down than a walk over all of them ever finishes.
+    /// there again, there are more ways down than a walk over all of them ever finishes. So there are
+    /// where many leaves place one large tree.
     pub(in crate::light_tree) fn is_walkable(&self) -> bool {
         self.trees().iter().all(|tree| {
             let groups = self.groups_of(tree);
@@ -26,7 +28,13 @@ impl<D: AsRef<[u8]>> LightTree<D> {
             Link::Instance(row) => self.instances().get(row as usize),
             _ => None,
         });
-        let mut kinds = below.map(|row| self.trees().get(row.tree as usize).and_then(TreeKind::of));
+        let most = (self.emitter_count() + self.groups().len()) as u64;
+        let mut placed = 0;
+        let mut kinds = below.map(|row| {
+            let tree = self.trees().get(row.tree as usize)?;
+            placed += u64::from(tree.group_count);
+            TreeKind::of(tree).filter(|_| placed <= most)
+        });
         match TreeKind::of(tree) {
             Some(TreeKind::Shared) => kinds.next().is_none(),
             Some(TreeKind::Still) => kinds.all(|kind| kind == Some(TreeKind::Shared)),

@@ -31,9 +31,9 @@ const YFOV_INSIDE_DEG: f64 = 60.0;
 /// A view of a scene.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Fitted {
-    /// Where the eye is, world space, metres.
+    /// Where the eye is, in the file's world, metres.
     pub from: DVec3,
-    /// What is in the middle of the picture, world space, metres.
+    /// What is in the middle of the picture, in the file's world, metres.
     pub at: DVec3,
     /// Full vertical field of view, radians.
     pub yfov_rad: f64,
@@ -72,10 +72,10 @@ pub(super) fn fit(scene: &Scene, aspect: f64, yfov_rad: Option<f64>) -> Fitted {
         }
     }
     let Sight { from, at, yfov_rad, .. } = sights[best];
-    Fitted { from, at, yfov_rad }
+    Fitted { from: from + scene.origin, at: at + scene.origin, yfov_rad }
 }
 
-/// The middle of what a picture of the scene should show, world space, metres.
+/// The middle of what a picture of the scene should show, in the file's world, metres.
 pub(super) fn middle(scene: &Scene) -> DVec3 {
-    Subject::of(scene).middle()
+    Subject::of(scene).middle() + scene.origin
 }

@@ -10,8 +10,8 @@ use crate::bounds::Aabb;
 use crate::math::random::hash;
 use crate::math::{Frame, warp};
 use crate::pipeline::frames_of;
-use crate::render::rays::{Anchor, HitSurface, RayScene, Tracer};
-use crate::scene::{AlphaMode, Instance, LightKind, Mesh, Node, Pose, Scene, Trs};
+use crate::render::rays::{Anchor, HitSurface, RayScene, Sender, Tracer};
+use crate::scene::{AlphaMode, Instance, LightKind, Mesh, Node, Pose, Scene, Trs, Visibility};
 use glam::{DAffine3, DMat3, DVec3, Vec2, Vec3};
 use rayon::prelude::*;
 use std::collections::BTreeSet;
@@ -148,14 +148,14 @@ fn is_blocked_toward(tracer: &Tracer, sample: &Sample, direction: Vec3) -> bool 
 fn blocks(tracer: &Tracer, sample: &Sample, direction: Vec3, length: f32, reach_m: f32) -> bool {
     let size = sample.point.abs().max_element();
     let mut anchor = Anchor::computed(sample.point, sample.normal, size);
-    let mut gone = 0.0;
+    let (mut gone, mut lights) = (0.0, Vec::new());
     // A ray meets few squares near its ends; it cannot go on for ever.
     for _ in 0..16 {
         let origin = anchor.origin_toward(direction);
         let left = (length - gone) * (1.0 - 1e-4);
-        let Some(hit) = tracer.closest(origin, direction, left, &|_, _, _| true) else {
-            return false;
-        };
+        let ray = (origin, direction, left);
+        let seen = tracer.look(Sender::Surface, ray, &|_, _, _| true, &mut lights);
+        let Some(hit) = seen.hit else { return false };
         gone += hit.t;
         let is_square = matches!(hit.surface, HitSurface::Triangle { instance: SQUARES, .. });
         if !is_square || (gone > sample.reach_m && gone < length - reach_m) {
@@ -283,6 +283,7 @@ impl<'a> Drawing<'a> {
             values: None,
             shaping: None,
             forced: false,
+            visibility: Visibility::default(),
         };
         Scene {
             nodes: vec![Node::fixed("/", None, Trs::default())],

@@ -1,9 +1,9 @@
 //! A set of triangles that a ray can search: the lower level of the kernel.
 
 use super::triangles::{Block, Ray, ShearedRay, plane_distance};
-use super::wide_bvh::{BoxRay, LEAF_SIZE, NONE, WideBvh, bounds_of};
+use super::wide_bvh::{BoxRay, LEAF_SIZE, NONE, WideBvh};
+use crate::bounds::Aabb;
 use glam::{DVec3, Vec3};
-use obvhs::aabb::Aabb;
 use rayon::prelude::*;
 
 /// Coordinates beyond this, in metres, are filtered: products of three of them must stay finite.
@@ -24,7 +24,7 @@ pub struct Blas {
     tree: WideBvh,
     blocks: Vec<Block>,
     ids: Vec<[TriangleId; LEAF_SIZE]>,
-    bounds: Option<(Vec3, Vec3)>,
+    bounds: Option<Aabb>,
 }
 
 /// Where a ray meets a triangle of a [`Blas`], in its space.
@@ -38,6 +38,13 @@ pub struct BlasHit {
     pub corners: [DVec3; 3],
 }
 
+impl BlasHit {
+    /// The same on an instance of the set.
+    pub fn of(&self, instance: u32) -> BlasHit {
+        BlasHit { id: TriangleId { instance, ..self.id }, ..*self }
+    }
+}
+
 impl Blas {
     /// Builds over triangles. Those with a coordinate that is not finite or beyond 1e12, and those
     /// without area, are left out: no ray meets them.
@@ -47,7 +54,7 @@ impl Blas {
             .filter(|&i| can_be_hit(&triangles[i as usize]))
             .collect();
         let boxes: Vec<Aabb> =
-            kept.par_iter().map(|&i| bounds_of(&triangles[i as usize])).collect();
+            kept.par_iter().map(|&i| Aabb::around(triangles[i as usize])).collect();
         let (tree, leaves) = WideBvh::build(&boxes, LEAF_SIZE as u32);
         let filled = leaves.par_iter().map(|leaf| {
             let (mut block, mut names) = (Block::EMPTY, [TriangleId::default(); LEAF_SIZE]);
@@ -59,62 +66,45 @@ impl Blas {
             (block, names)
         });
         let (blocks, ids) = filled.unzip();
-        let whole = boxes.iter().copied().reduce(|a, b| a.union(&b));
-        let bounds = whole.map(|whole| (Vec3::from(whole.min), Vec3::from(whole.max)));
+        let bounds = boxes.iter().copied().reduce(|a, b| a.union(&b));
         Blas { tree, blocks, ids, bounds }
     }
 
-    /// Lower and upper corner of all triangles; `None` if there are none.
-    pub fn bounds(&self) -> Option<(Vec3, Vec3)> {
+    /// Around all triangles; `None` if there are none.
+    pub fn bounds(&self) -> Option<Aabb> {
         self.bounds
     }
 
-    /// The nearest accepted triangle with `0 < t < tmax`.
+    /// Calls `met` with the triangles that the ray meets at a distance in `(0, tmax)`, near ones
+    /// roughly first if `ORDERED`. It returns the new `tmax`; a negative one ends the search.
     #[inline]
-    pub fn closest(
+    pub fn visit<const ORDERED: bool>(
         &self,
         ray: &Ray,
         tmax: f64,
-        accept: impl Fn(&BlasHit) -> bool,
-    ) -> Option<BlasHit> {
-        self.search::<true>(ray, tmax, accept)
-    }
-
-    /// Whether any accepted triangle has `0 < t < tmax`.
-    #[inline]
-    pub fn occluded(&self, ray: &Ray, tmax: f64, accept: impl Fn(&BlasHit) -> bool) -> bool {
-        self.search::<false>(ray, tmax, accept).is_some()
-    }
-
-    fn search<const CLOSEST: bool>(
-        &self,
-        ray: &Ray,
-        tmax: f64,
-        accept: impl Fn(&BlasHit) -> bool,
-    ) -> Option<BlasHit> {
+        met: impl FnMut(&BlasHit) -> f64,
+    ) {
         let d = ray.direction.abs();
         if d.x >= d.y && d.x >= d.z {
-            self.search_along::<CLOSEST, 0>(ray, tmax, accept)
+            self.visit_along::<ORDERED, 0>(ray, tmax, met)
         } else if d.y >= d.z {
-            self.search_along::<CLOSEST, 1>(ray, tmax, accept)
+            self.visit_along::<ORDERED, 1>(ray, tmax, met)
         } else {
-            self.search_along::<CLOSEST, 2>(ray, tmax, accept)
+            self.visit_along::<ORDERED, 2>(ray, tmax, met)
         }
     }
 
-    fn search_along<const CLOSEST: bool, const KZ: usize>(
+    fn visit_along<const ORDERED: bool, const KZ: usize>(
         &self,
         ray: &Ray,
-        tmax: f64,
-        accept: impl Fn(&BlasHit) -> bool,
-    ) -> Option<BlasHit> {
+        mut tmax: f64,
+        mut met: impl FnMut(&BlasHit) -> f64,
+    ) {
         let (origin, direction) = (ray.origin.as_vec3(), ray.direction.as_vec3());
         let box_ray = BoxRay::new(origin, direction);
         let sheared = ShearedRay::<KZ>::new(origin, direction);
-        let mut best = tmax;
         let mut bound = search_limit(tmax);
-        let mut found = None;
-        self.tree.walk::<CLOSEST>(&box_ray, bound, |leaf| {
+        self.tree.walk::<ORDERED>(&box_ray, bound, |leaf| {
             let block = &self.blocks[leaf as usize];
             let mut lanes = block.candidates(&sheared, bound);
             while lanes != 0 {
@@ -122,23 +112,17 @@ impl Blas {
                 lanes &= lanes - 1;
                 let corners = block.get(lane);
                 let Some(t) = plane_distance(ray, corners) else { continue };
-                if !(t > 0.0 && t < best) {
+                if !(t > 0.0 && t < tmax) {
                     continue;
                 }
-                let hit = BlasHit { t, id: self.ids[leaf as usize][lane], corners };
-                if !accept(&hit) {
-                    continue;
-                }
-                found = Some(hit);
-                if !CLOSEST {
+                tmax = met(&BlasHit { t, id: self.ids[leaf as usize][lane], corners });
+                if tmax < 0.0 {
                     return -1.0;
                 }
-                best = t;
-                bound = search_limit(t);
+                bound = search_limit(tmax);
             }
             bound
         });
-        found
     }
 }
 

@@ -7,19 +7,28 @@
 //!
 //! What callers may rely on:
 //!
-//! - The hit nearest to the origin at a distance in the open interval `(0, tmax)`, found
-//!   watertight (Woop 2013) and measured in double precision. There is no scene epsilon.
+//! - Every hit lies at a distance in the open interval `(0, tmax)`, is found
+//!   watertight (Woop 2013) and is measured in double precision. There is no scene epsilon.
 //!   Coordinates from 1e-9 to 1e9 metres are tested; beyond 1e12 they are filtered.
 //! - A ray that starts at [`Anchor::origin_toward`] does not meet the surface it left.
 //! - Triangles are two-sided; the normal is the front's, which counts the corners
 //!   counter-clockwise, and clockwise under a mirroring transform (glTF 2.0, 3.7.4).
 //! - Sphere lights are surfaces that a ray hits from outside and from inside.
+//! - Which prims a ray meets depends on who [sent](Sender) it, by their
+//!   [`Visibility`](crate::scene::Visibility).
+//! - Surfaces in one place are told apart by rules that know nothing of the order of the prims;
+//!   see [`Tracer::look`] and the page of `sight`.
+//! - Preparing takes `O(n log n)` time for every input.
 //!
 //! Not here: shading (`surface`), and what happens at a cut-out, which the caller decides through
 //! the `accept` function; it is asked only about meshes whose material has a coverage.
 
 mod anchor;
+mod binary_bvh;
 mod blas;
+mod meeting;
+mod prim;
+mod sight;
 mod sphere;
 #[cfg(test)]
 mod tests;
@@ -28,9 +37,12 @@ mod triangles;
 mod wide_bvh;
 
 pub use anchor::Anchor;
-pub use tracer::{Hit, HitSurface, Tracer};
+pub use meeting::{Hit, HitSurface};
+pub use prim::Sender;
+pub use sight::{Seen, SeenLight};
+pub use tracer::Tracer;
 
-use crate::scene::{AlphaMode, Instance, Mesh, Pose, Scene};
+use crate::scene::{Instance, Mesh, Pose, Scene};
 use blas::{Blas, TriangleId};
 use glam::{DAffine3, DMat3, Vec3};
 use rayon::prelude::*;
@@ -50,8 +62,8 @@ pub struct RayScene {
     shared: Vec<Blas>,
     /// Instances of the shared sets.
     placed: Vec<Placed>,
-    /// By instance: its material has a coverage that a hit must ask for.
-    cutout: Vec<bool>,
+    /// By instance: its place in the order of paths.
+    ranks: Vec<u32>,
 }
 
 /// An instance that refers to a shared set.
@@ -100,7 +112,7 @@ impl RayScene {
             fixed: Blas::build(&triangles, &ids),
             shared: meshes.par_iter().map(local).collect(),
             placed,
-            cutout: scene.instances.iter().map(|instance| is_cutout(scene, instance)).collect(),
+            ranks: ranks(&scene.instances),
         }
     }
 
@@ -110,9 +122,15 @@ impl RayScene {
     }
 }
 
-fn is_cutout(scene: &Scene, instance: &Instance) -> bool {
-    let material = scene.meshes[instance.mesh as usize].material;
-    material.is_some_and(|m| scene.materials[m as usize].alpha_mode != AlphaMode::Opaque)
+/// The place of each instance in the order of paths.
+fn ranks(instances: &[Instance]) -> Vec<u32> {
+    let mut order: Vec<u32> = (0..instances.len() as u32).collect();
+    order.par_sort_by_key(|&row| instances[row as usize].path.as_str());
+    let mut ranks = vec![0; instances.len()];
+    for (rank, row) in (0..).zip(order) {
+        ranks[row as usize] = rank;
+    }
+    ranks
 }
 
 /// The triangles of a mesh, transformed in double precision and rounded once.

@@ -1,15 +1,29 @@
 //! The ray kernel against brute force in double precision; laws that need none are in `laws`.
 
 mod laws;
+mod sights;
 
 use super::*;
 use crate::math::color::Rgb;
 use crate::math::random::hash;
 use crate::math::warp;
-use crate::scene::{Channel, Interpolation, Keys, Light, LightKind, Material, Node, Trs};
+use crate::scene::{
+    AlphaMode, Channel, Interpolation, Keys, Light, LightKind, Material, Node, Trs,
+};
 use glam::{DQuat, DVec3, Quat, Vec2};
 
 const ALL: fn(u32, u32, Vec2) -> bool = |_, _, _| true;
+
+/// What a ray of a surface ends on.
+fn closest(
+    tracer: &Tracer,
+    origin: Vec3,
+    direction: Vec3,
+    tmax: f32,
+    accept: &impl Fn(u32, u32, Vec2) -> bool,
+) -> Option<Hit> {
+    tracer.look(Sender::Surface, (origin, direction, tmax), accept, &mut Vec::new()).hit
+}
 
 /// Uniform numbers, the same every time.
 struct Numbers(u32);
@@ -49,6 +63,7 @@ fn scene(meshes: Vec<Mesh>, placed: &[(u32, Trs)]) -> Scene {
             values: None,
             shaping: None,
             forced: false,
+            visibility: Default::default(),
         });
     }
     scene
@@ -114,7 +129,7 @@ fn agree(scene: &Scene, time_s: f64, center: Vec3, scale: f32, rays: usize) {
         let aim = a + (b - a) * uv.x + (c - a) * uv.y;
         let aimed = (aim - origin.as_dvec3()).normalize().as_vec3();
         let direction = if numbers.next() < 0.7 { aimed } else { numbers.direction() };
-        let found = tracer.closest(origin, direction, f32::INFINITY, &ALL);
+        let found = closest(&tracer, origin, direction, f32::INFINITY, &ALL);
         let expected = brute(&all, origin, direction);
         let name = found.map(|hit| match hit.surface {
             HitSurface::Triangle { instance, triangle, .. } => (instance, triangle),
@@ -149,7 +164,7 @@ fn agree(scene: &Scene, time_s: f64, center: Vec3, scale: f32, rays: usize) {
         let limit = hit.t;
         assert!(tracer.occluded(origin, direction, limit.next_up(), &ALL));
         assert!(!tracer.occluded(origin, direction, limit * (1.0 - 1e-6), &ALL));
-        assert!(tracer.closest(origin, direction, limit * (1.0 - 1e-6), &ALL).is_none());
+        assert!(closest(&tracer, origin, direction, limit * (1.0 - 1e-6), &ALL).is_none());
     }
     assert!(hits * 4 > rays, "only {hits} hits of {rays}");
     assert!(unsure * 200 < rays, "{unsure} rays disagree at an edge");

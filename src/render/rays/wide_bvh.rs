@@ -1,17 +1,13 @@
 //! An eight-wide bounding hierarchy: its nodes, and how it is built and walked.
 //!
-//! The binary tree underneath is `obvhs`' (PLOC with parallel reinsertion, deterministic); here it
-//! is collapsed so that one step tests eight boxes, and small subtrees become leaves of up to four
-//! primitives, which one step tests together as well. Why `obvhs`' own traversal is not used: its
-//! wide tree has a fixed epsilon of 1e-4 metres, its binary one is slower, neither knows leaves
-//! of four. The box test is Ize's ("Robust BVH Ray Traversal", 2013): it never misses a box that
+//! The [binary tree](super::binary_bvh) underneath is collapsed so that one step tests eight boxes,
+//! and small subtrees become leaves of up to four primitives, which one step tests together as well.
+//! The box test is Ize's ("Robust BVH Ray Traversal", 2013): it never misses a box that
 //! the exact ray enters, at any scale.
 
-use glam::{Vec3, Vec3A, Vec4};
-use obvhs::aabb::Aabb;
-use obvhs::bvh2::Bvh2;
-use obvhs::bvh2::reinsertion::ReinsertionOptimizer;
-use obvhs::ploc::{PlocBuilder, PlocSearchDistance, SortPrecision};
+use super::binary_bvh::{self, BinaryNode};
+use crate::bounds::Aabb;
+use glam::{Vec3, Vec4};
 
 /// Most primitives of a leaf.
 pub const LEAF_SIZE: usize = 4;
@@ -72,16 +68,7 @@ impl WideBvh {
         if boxes.is_empty() {
             return (WideBvh::default(), Vec::new());
         }
-        let indices = (0..boxes.len() as u32).collect();
-        let mut binary = PlocBuilder::with_capacity(boxes.len()).build(
-            PlocSearchDistance::Medium,
-            boxes,
-            indices,
-            SortPrecision::U64,
-            3,
-        );
-        ReinsertionOptimizer::default().run(&mut binary, 0.2, None);
-        Collapse::run(&binary, leaf_size)
+        Collapse::run(&binary_bvh::build(boxes), leaf_size)
     }
 
     /// Visits the leaves whose boxes the ray enters before `tmax`, near ones first if `ORDERED`.
@@ -188,19 +175,16 @@ impl Node {
 
 /// From the binary tree to the wide one.
 struct Collapse<'a> {
-    binary: &'a Bvh2,
-    /// Primitives below each binary node.
-    counts: Vec<u32>,
+    binary: &'a [BinaryNode],
     leaf_size: u32,
     wide: WideBvh,
     leaves: Vec<[u32; LEAF_SIZE]>,
 }
 
 impl Collapse<'_> {
-    fn run(binary: &Bvh2, leaf_size: u32) -> (WideBvh, Vec<[u32; LEAF_SIZE]>) {
-        let counts = count_primitives(binary);
+    fn run(binary: &[BinaryNode], leaf_size: u32) -> (WideBvh, Vec<[u32; LEAF_SIZE]>) {
         let (wide, leaves) = (WideBvh::default(), Vec::new());
-        let mut collapse = Collapse { binary, counts, leaf_size, wide, leaves };
+        let mut collapse = Collapse { binary, leaf_size, wide, leaves };
         // Nodes are numbered as they are reached depth first; each patches its parent.
         let mut open = vec![(0_usize, None::<(usize, usize)>, 1_usize)];
         let mut deepest = 0;
@@ -212,13 +196,13 @@ impl Collapse<'_> {
             }
             collapse.wide.nodes.push(Node::EMPTY);
             for (slot, child) in collapse.children_of(top).into_iter().enumerate() {
-                let bounds = *binary.nodes[child].aabb();
+                let BinaryNode { bounds, count, .. } = binary[child];
                 let node = &mut collapse.wide.nodes[number];
                 for axis in 0..3 {
                     node.planes[axis][0][slot / 4][slot % 4] = bounds.min[axis];
                     node.planes[axis][1][slot / 4][slot % 4] = bounds.max[axis];
                 }
-                if collapse.counts[child] <= leaf_size {
+                if count <= leaf_size {
                     node.children[slot] = LEAF | collapse.leaves.len() as u32;
                     let leaf = collapse.primitives_of(child);
                     collapse.leaves.push(leaf);
@@ -233,13 +217,17 @@ impl Collapse<'_> {
 
     /// Up to eight descendants that cover `top`: the largest is opened first.
     fn children_of(&self, top: usize) -> Vec<usize> {
+        let area = |&node: &usize| {
+            let size = self.binary[node].bounds.extent();
+            size.x * size.y + size.y * size.z + size.z * size.x
+        };
         let mut chosen = vec![top];
         while chosen.len() < FAN {
-            let area = |&child: &usize| self.binary.nodes[child].aabb().half_area();
-            let inner = (0..chosen.len()).filter(|&i| self.counts[chosen[i]] > self.leaf_size);
+            let is_inner = |&i: &usize| self.binary[chosen[i]].count > self.leaf_size;
+            let inner = (0..chosen.len()).filter(is_inner);
             let largest = inner.max_by(|&a, &b| area(&chosen[a]).total_cmp(&area(&chosen[b])));
             let Some(largest) = largest else { break };
-            let left = self.binary.nodes[chosen[largest]].first_index as usize;
+            let left = self.binary[chosen[largest]].first as usize;
             chosen[largest] = left;
             chosen.push(left + 1);
         }
@@ -250,49 +238,16 @@ impl Collapse<'_> {
         let mut found = [NONE; LEAF_SIZE];
         let (mut filled, mut open) = (0, vec![top]);
         while let Some(node) = open.pop() {
-            let node = &self.binary.nodes[node];
-            let first = node.first_index as usize;
-            if node.is_leaf() {
-                for i in first..first + node.prim_count as usize {
-                    found[filled] = self.binary.primitive_indices[i];
-                    filled += 1;
-                }
+            let BinaryNode { first, count, .. } = self.binary[node];
+            if count == 1 {
+                found[filled] = first;
+                filled += 1;
             } else {
-                open.extend([first + 1, first]);
+                open.extend([first as usize + 1, first as usize]);
             }
         }
         found
     }
-}
-
-/// Primitives below each node; children need not stand after their parents.
-fn count_primitives(binary: &Bvh2) -> Vec<u32> {
-    let mut order = Vec::with_capacity(binary.nodes.len());
-    let mut open = vec![0_usize];
-    while let Some(node) = open.pop() {
-        order.push(node);
-        if !binary.nodes[node].is_leaf() {
-            let first = binary.nodes[node].first_index as usize;
-            open.extend([first, first + 1]);
-        }
-    }
-    let mut counts = vec![0; binary.nodes.len()];
-    for &node in order.iter().rev() {
-        let data = &binary.nodes[node];
-        let first = data.first_index as usize;
-        counts[node] =
-            if data.is_leaf() { data.prim_count } else { counts[first] + counts[first + 1] };
-    }
-    counts
-}
-
-/// A box around points.
-pub fn bounds_of(points: &[Vec3]) -> Aabb {
-    let mut bounds = Aabb::INVALID;
-    for &point in points {
-        bounds.extend(Vec3A::from(point));
-    }
-    bounds
 }
 
 #[cfg(test)]
@@ -301,12 +256,12 @@ mod tests {
 
     #[test]
     fn a_deep_tree_is_walked_from_the_heap() {
-        // Each box is a little larger than the one in it: no balance is possible.
+        // Each box is a little larger than the one in it: a division by cost takes off few.
         let nested = |i: i32| {
-            let size = 1.2_f32.powi(i - 200);
-            Aabb::new(Vec3A::ZERO, Vec3A::splat(size))
+            let size = 10_f32.powf((i - 30_000) as f32 / 1_000.0);
+            Aabb { min: Vec3::ZERO, max: Vec3::splat(size) }
         };
-        let boxes: Vec<_> = (0..400).map(nested).collect();
+        let boxes: Vec<_> = (0..60_000).map(nested).collect();
         let (tree, leaves) = WideBvh::build(&boxes, 1);
         assert!(tree.stack > SHALLOW, "only {} entries", tree.stack);
         let ray = BoxRay::new(Vec3::splat(-1.0), Vec3::ONE);

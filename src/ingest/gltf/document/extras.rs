@@ -46,7 +46,17 @@ pub(in crate::ingest::gltf) struct UsdLux {
     pub texture: Option<String>,
     #[serde(default)]
     pub force: bool,
+    #[serde(default)]
+    pub visibility: UsdVisibility,
     pub values: Option<UsdValues>,
+}
+
+/// `extras.usdLux.visibility`: where it differs from what the type has.
+#[derive(Clone, Copy, Default, Deserialize)]
+pub(in crate::ingest::gltf) struct UsdVisibility {
+    pub camera: Option<bool>,
+    pub reflections: Option<bool>,
+    pub shadows: Option<bool>,
 }
 
 /// `extras.usdLux.values`: the light's strength over time.

@@ -18,7 +18,7 @@ fn the_normal_is_the_fronts_whatever_the_transform() {
             let prepared = RayScene::new(&scene, &pose);
             let tracer = prepared.for_pose(&scene, &pose);
             let s = scale.as_vec3() * Vec3::new(0.2, 0.2, 0.0);
-            let hit = tracer.closest(s + Vec3::Z, -Vec3::Z, 9.0, &ALL).unwrap();
+            let hit = closest(&tracer, s + Vec3::Z, -Vec3::Z, 9.0, &ALL).unwrap();
             assert_eq!(hit.anchor.normal, Vec3::Z * front, "{scale} {moving}");
         }
     }
@@ -29,7 +29,14 @@ fn with_sphere(radius: f32, at: DVec3, scale: f64) -> Scene {
     let local = parts(at, DQuat::IDENTITY, DVec3::splat(scale));
     scene.nodes.push(Node::fixed("/lamp", None, local));
     let kind = LightKind::Sphere { radiance_nits: Rgb::ONE, radius, shaping: None };
-    scene.lights.push(Light { node: 0, kind, values: None, range_m: None, forced: false });
+    scene.lights.push(Light {
+        node: 0,
+        kind,
+        values: None,
+        range_m: None,
+        forced: false,
+        visibility: Default::default(),
+    });
     scene
 }
 
@@ -46,15 +53,15 @@ fn spheres_are_met_from_outside_and_from_inside() {
             let toward = numbers.direction();
             for (from, sign) in [(2.0, -1.0), (0.3, 1.0)] {
                 let origin = center + toward * (from * scale);
-                let hit = tracer.closest(origin, toward * sign, f32::INFINITY, &ALL).unwrap();
+                let hit = closest(&tracer, origin, toward * sign, f32::INFINITY, &ALL).unwrap();
                 assert_eq!(hit.surface, HitSurface::Sphere { light: 0 });
                 assert!((hit.t - (from - 0.5).abs() * scale).abs() < 1e-5 * scale);
                 assert!((hit.anchor.normal - toward).length() < 1e-5);
                 // Outward the sphere is left behind; inward its other side is seen.
                 let away = hit.anchor.origin_toward(toward);
-                assert!(tracer.closest(away, toward, f32::INFINITY, &ALL).is_none());
+                assert!(closest(&tracer, away, toward, f32::INFINITY, &ALL).is_none());
                 let inward = hit.anchor.origin_toward(-toward);
-                let across = tracer.closest(inward, -toward, f32::INFINITY, &ALL).unwrap();
+                let across = closest(&tracer, inward, -toward, f32::INFINITY, &ALL).unwrap();
                 assert!((across.t - scale).abs() < 1e-5 * scale);
             }
             let side = toward.any_orthonormal_vector();
@@ -94,7 +101,7 @@ fn a_ray_never_meets_the_surface_it_leaves() {
                 for _ in 0..300 {
                     let origin = (numbers.point() * 4.0 - 2.0) * scale;
                     let toward = numbers.direction();
-                    let Some(hit) = tracer.closest(origin, toward, f32::INFINITY, &ALL) else {
+                    let Some(hit) = closest(&tracer, origin, toward, f32::INFINITY, &ALL) else {
                         continue;
                     };
                     hits += 1;
@@ -144,7 +151,7 @@ fn no_ray_slips_between_triangles() {
         let next = at(i % n + 1, (i / n + i % 2) % (2 * n));
         let aim = if i % 4 < 2 { target.lerp(next, numbers.next()) } else { target };
         let direction = if i % 2 == 0 { numbers.direction() } else { (aim - origin).normalize() };
-        assert!(tracer.closest(origin, direction, f32::INFINITY, &ALL).is_some(), "leak {i}");
+        assert!(closest(&tracer, origin, direction, f32::INFINITY, &ALL).is_some(), "leak {i}");
         assert!(tracer.occluded(origin, direction, 10.0, &ALL));
     }
 }
@@ -170,7 +177,7 @@ fn cutouts_ask_and_others_do_not() {
         };
         for (x, t) in [(0.2, 1.0), (0.7, 2.0)] {
             let origin = Vec3::new(x, 0.1, 2.0);
-            let hit = tracer.closest(origin, -Vec3::Z, 9.0, &left_half).unwrap();
+            let hit = closest(&tracer, origin, -Vec3::Z, 9.0, &left_half).unwrap();
             assert_eq!(hit.t, t);
             let blocked = tracer.occluded(origin, -Vec3::Z, 1.5, &left_half);
             assert_eq!(blocked, t == 1.0);
@@ -209,11 +216,11 @@ fn empty_and_broken_geometry_is_never_hit() {
         let mut numbers = Numbers(12);
         for _ in 0..200 {
             let (o, d) = (numbers.point() - 0.5, numbers.direction());
-            assert!(tracer.closest(o, d, f32::INFINITY, &ALL).is_none());
+            assert!(closest(&tracer, o, d, f32::INFINITY, &ALL).is_none());
             assert!(!tracer.occluded(o, d, f32::INFINITY, &ALL));
         }
         for bad in [Vec3::NAN, Vec3::INFINITY, Vec3::ZERO] {
-            assert!(tracer.closest(Vec3::ZERO, bad, 1.0, &ALL).is_none());
+            assert!(closest(&tracer, Vec3::ZERO, bad, 1.0, &ALL).is_none());
             assert!(tracer.occluded(Vec3::ZERO, bad, 1.0, &ALL));
         }
     }
@@ -233,7 +240,7 @@ fn a_flat_scaled_moving_mesh_is_a_flat_mesh() {
     for _ in 0..500 {
         let origin = numbers.point() + Vec3::Z;
         let expected = brute(&all, origin, -Vec3::Z).is_some();
-        assert_eq!(tracer.closest(origin, -Vec3::Z, 9.0, &ALL).is_some(), expected);
+        assert_eq!(closest(&tracer, origin, -Vec3::Z, 9.0, &ALL).is_some(), expected);
     }
 }
 

@@ -1,0 +1,71 @@
+"""What UsdLux says of a light and glTF cannot hold: each is a line in the report."""
+
+from __future__ import annotations
+
+from pxr import Sdf, Usd
+
+from .light_attributes import LightAttributes
+
+
+def report_losses(inputs: LightAttributes) -> None:
+    """Report everything about a light that the file holds only as extras, or not at all."""
+    _multipliers(inputs)
+    _shadows(inputs)
+    _profile(inputs)
+    _relations(inputs)
+
+
+def _multipliers(inputs: LightAttributes) -> None:
+    diffuse, specular = inputs.first("diffuse"), inputs.first("specular")
+    if diffuse == 1.0 and specular == 1.0 and not inputs.varies("diffuse") and not inputs.varies("specular"):
+        return
+    why = f"multipliers have no carrier; the whole light is carried {diffuse:g} times as bright"
+    if specular != diffuse:
+        why += f", highlights too, which should be {specular:g} times as bright"
+    name = "diffuse" if diffuse != 1.0 or inputs.varies("diffuse") else "specular"
+    inputs.report.warn(inputs.path, f"inputs:{name}", why)
+
+
+def _shadows(inputs: LightAttributes) -> None:
+    why = "a non-physical control without a carrier; the light casts plain shadows"
+    if not inputs.still("shadow:enable"):
+        inputs.report.warn(inputs.path, "shadow:enable = false", why)
+    if any(inputs.still("shadow:color")):
+        inputs.report.warn(inputs.path, "shadow:color", why)
+    if inputs.still("shadow:distance") >= 0:
+        inputs.report.warn(inputs.path, "shadow:distance", why)
+    if inputs.still("shadow:falloff") >= 0:
+        inputs.report.warn(inputs.path, "shadow:falloff", why)
+
+
+def _profile(inputs: LightAttributes) -> None:
+    ies = inputs.asset("shaping:ies:file")
+    if ies is None:
+        return
+    asset = ies.Get(inputs.frames.first)
+    name = asset.path if isinstance(asset, Sdf.AssetPath) else "it"
+    why = f"{name} is kept in extras only; the light is exported without it"
+    if not inputs.first("shaping:ies:normalize"):
+        why += " and without the profile's own brightness, which UsdLux multiplies by"
+    inputs.report.warn(inputs.path, "IES profile", why)
+
+
+def _relations(inputs: LightAttributes) -> None:
+    prim, path, report = inputs.prim, inputs.path, inputs.report
+
+    def targets(name: str) -> list:
+        relationship = prim.GetRelationship(name)
+        return relationship.GetTargets() if relationship else []
+
+    # Files before USD 21.02 say `filters`.
+    if targets("light:filters") or targets("filters"):
+        report.warn(path, "light filters", "they have no carrier; the light is exported unfiltered")
+    for link in ("lightLink", "shadowLink"):
+        collection = f"collection:{link}"
+        root = prim.GetAttribute(f"{collection}:includeRoot").Get()
+        listed = targets(f"{collection}:includes") or targets(f"{collection}:excludes")
+        if Usd.CollectionAPI(prim, link) and (root is False or listed):
+            lost = "lights everything" if link == "lightLink" else "is shadowed by everything"
+            report.warn(path, link, f"linking has no carrier; the light {lost}")
+    if str(prim.GetTypeName()).startswith("DomeLight") and targets("portals"):
+        report.note(path, "dome portals", "they only guide sampling and have no carrier")

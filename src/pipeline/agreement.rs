@@ -1,0 +1,282 @@
+//! Whether a tree says of its lights what their scene gives.
+//!
+//! `verify` proves of a tree alone that clusters bound their leaves. That the leaves bound the
+//! emitters, only the scene can show: here each leaf is held, bit by bit, against the bounds that it
+//! must have been built from. Together both prove that no light is called dark that is not. What
+//! neither proves is that the tree is as good as a build's: clusters may be wider than they need be,
+//! or badly cut, which makes pictures noisier and not wrong.
+
+use super::build::in_world;
+use super::survey::{Group, PlacedLight, Survey};
+use super::textures;
+use crate::bounds::LightBounds;
+use crate::light_tree::{LightList, LightRow, LightTree, Link, Node, TreeKind, TreeRow, WIDTH};
+use rayon::prelude::*;
+use std::fmt;
+
+/// Something that a tree says of a light and its scene does not.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Contradiction {
+    /// Prim path of the light; empty if it is about no light.
+    pub path: String,
+    /// What of it, in words.
+    pub what: &'static str,
+}
+
+impl fmt::Display for Contradiction {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Contradiction { path, what } = self;
+        match path.is_empty() {
+            true => write!(f, "{what}"),
+            false => write!(f, "light {path}: {what}"),
+        }
+    }
+}
+
+/// What a tree file is to a scene.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Standing {
+    /// What a build would write, as far as a comparison can tell.
+    UpToDate,
+    /// Of another scene, or an earlier version of it; or without what a build would add.
+    OutOfDate,
+    /// Of this scene, and yet it says something else of a light.
+    Contradicts(Contradiction),
+}
+
+/// What a tree file, which must have been verified, is to a scene that was surveyed.
+pub fn standing<D: AsRef<[u8]> + Sync>(tree: &LightTree<D>, survey: &Survey) -> Standing {
+    if tree.fingerprint() != survey.fingerprint {
+        return Standing::OutOfDate;
+    }
+    match find_contradiction(tree, survey, true) {
+        Some(contradiction) => Standing::Contradicts(contradiction),
+        None if tree.textures().is_empty() && !survey.textures.is_empty() => Standing::OutOfDate,
+        None => Standing::UpToDate,
+    }
+}
+
+/// The first thing that a tree with the fingerprint of a survey says and the survey does not: of the
+/// rows of lights, and of the means of textures if the file has any; with `leaves`, also of all
+/// leaves.
+pub(super) fn find_contradiction<D: AsRef<[u8]> + Sync>(
+    tree: &LightTree<D>,
+    survey: &Survey,
+    leaves: bool,
+) -> Option<Contradiction> {
+    let agreement = Agreement { tree, survey };
+    let of_trees = || if leaves { agreement.of_trees() } else { None };
+    agreement.of_lights().or_else(|| agreement.of_textures()).or_else(of_trees)
+}
+
+struct Agreement<'a, D> {
+    tree: &'a LightTree<D>,
+    survey: &'a Survey,
+}
+
+impl<D: AsRef<[u8]> + Sync> Agreement<'_, D> {
+    /// The rows of lights.
+    fn of_lights(&self) -> Option<Contradiction> {
+        let list = LightList::new(&self.survey.lights);
+        let rows = self.tree.lights();
+        if rows.len() != self.survey.lights.len() {
+            return Some(self.in_general("the number of lights"));
+        }
+        let differs = |(at, row): (usize, &LightRow)| {
+            let now = list.row(at);
+            let path = &self.survey.lights[at].path;
+            let what = if self.tree.light_path(row) != path {
+                "its path"
+            } else if (row.first_emitter, row.emitter_count)
+                != (now.first_emitter, now.emitter_count)
+            {
+                "its emitters"
+            } else if row.class != now.class {
+                "its class"
+            } else if row.fingerprint != now.fingerprint {
+                "its fingerprint"
+            } else if row.energy.to_bits() != now.energy.to_bits() {
+                "its energy"
+            } else if row.look != now.look {
+                "its kind or colour"
+            } else {
+                return None;
+            };
+            Some(Contradiction { path: path.clone(), what })
+        };
+        rows.par_iter().enumerate().find_map_first(differs)
+    }
+
+    /// The means of textures.
+    fn of_textures(&self) -> Option<Contradiction> {
+        let is_so =
+            self.tree.textures().is_empty() || textures::has_just(self.tree, &self.survey.textures);
+        (!is_so).then(|| self.in_general("the means of the emission textures"))
+    }
+
+    /// The leaves of all trees, and where they are placed.
+    fn of_trees(&self) -> Option<Contradiction> {
+        let Agreement { tree, survey } = *self;
+        let is_shared = |row: &&TreeRow| TreeKind::of(row) == Some(TreeKind::Shared);
+        let shared = tree.trees().iter().take_while(is_shared).count();
+        if shared != survey.shared.len() {
+            return Some(self.in_general("the number of lights that have trees of their own"));
+        }
+        let own = tree.trees().par_iter().zip(&survey.shared).enumerate();
+        let of_own = own.find_map_first(|(at, (row, shared))| {
+            let group = |link| match link {
+                Link::Emitter(own) => shared.bounds.get(own as usize).copied(),
+                _ => None,
+            };
+            self.of_leaves(row, shared.bounds.len(), group, |_| self.light_of_shared(at))
+        });
+        let frames = || (0..survey.frames.len()).find_map(|at| self.of_frame(at));
+        of_own.or_else(|| self.of_still()).or_else(frames)
+    }
+
+    /// What stands still, and the forced lights of a file without frames.
+    fn of_still(&self) -> Option<Contradiction> {
+        let still = &self.survey.still;
+        let row = self.tree.still_tree();
+        let of_row = match row {
+            Some(row) => self.of_group(&self.tree.trees()[row as usize], still, 0),
+            None if still.flat.is_empty() && still.placed.is_empty() => None,
+            None => Some(self.in_general("that nothing stands still")),
+        };
+        let forced = || match self.survey.frames.is_empty() {
+            true => self.of_forced(self.tree.forced(), [still].into_iter()),
+            false => None,
+        };
+        of_row.or_else(forced)
+    }
+
+    /// What changes, in one frame.
+    fn of_frame(&self, at: usize) -> Option<Contradiction> {
+        let (frame, group) = &self.survey.frames[at];
+        let Ok((row, forced)) = self.tree.roots_at(*frame) else {
+            return Some(self.in_general("the frames"));
+        };
+        let still = self.tree.still_tree();
+        let of_row = match row {
+            _ if group.flat.is_empty() && group.placed.is_empty() => {
+                (row != still).then(|| self.in_general("that something changes"))
+            }
+            Some(row) => match self.tree.trees().get(row as usize) {
+                Some(row) => self.of_group(row, group, usize::from(still.is_some())),
+                None => Some(self.in_general("the tree of a frame")),
+            },
+            None => Some(self.in_general("that nothing shines in a frame")),
+        };
+        of_row.or_else(|| self.of_forced(forced, [&self.survey.still, group].into_iter()))
+    }
+
+    /// A tree over what is sampled together, and perhaps the tree of what stands still.
+    fn of_group(&self, row: &TreeRow, group: &Group, below: usize) -> Option<Contradiction> {
+        let count = group.flat.len() + group.placed.len() + below;
+        let bounds_of = |link| match link {
+            Link::Emitter(emitter) => {
+                let at = emitter.checked_sub(group.first)?;
+                group.flat.get(at as usize).copied()
+            }
+            Link::Instance(instance) => {
+                let instance = self.tree.instances().get(instance as usize)?;
+                let below = self.tree.trees().get(instance.tree as usize)?;
+                if TreeKind::of(below) == Some(TreeKind::Still) {
+                    return Some(below.root.bounds());
+                }
+                let placed = self.placed(&group.placed, instance.first_emitter)?;
+                let is_placed_so =
+                    instance.to_local == placed.to_local && instance.tree == placed.shared;
+                is_placed_so.then(|| in_world(&below.root.bounds(), placed))
+            }
+            Link::Inner(_) | Link::Nothing => None,
+        };
+        let light_of = |link| match link {
+            Link::Emitter(emitter) => self.light_of(emitter),
+            Link::Instance(row) => {
+                let row = self.tree.instances().get(row as usize);
+                row.map_or_else(String::new, |row| self.light_of(row.first_emitter))
+            }
+            Link::Inner(_) | Link::Nothing => String::new(),
+        };
+        self.of_leaves(row, count, bounds_of, light_of)
+    }
+
+    /// The leaves of a tree, of which there must be so many.
+    fn of_leaves(
+        &self,
+        row: &TreeRow,
+        count: usize,
+        bounds_of: impl Fn(Link) -> Option<LightBounds> + Sync,
+        light_of: impl Fn(Link) -> String + Sync,
+    ) -> Option<Contradiction> {
+        if row.leaf_count as usize != count {
+            return Some(self.in_general("the number of leaves of a tree"));
+        }
+        let differs = |node: Node| {
+            let link = node.link();
+            if let Link::Inner(_) = link {
+                return None;
+            }
+            let what = match bounds_of(link) {
+                Some(bounds) => node.difference(&Node::encode(&bounds, link))?,
+                None => "its place in a tree",
+            };
+            Some(Contradiction { path: light_of(link), what })
+        };
+        /// Groups looked at by one task.
+        const TOGETHER: usize = 1 << 8;
+        let chunks = self.tree.groups_of(row).par_chunks(TOGETHER);
+        chunks.find_map_first(|groups| {
+            let lanes = groups.iter().flat_map(|group| (0..WIDTH).map(|lane| group.node(lane)));
+            lanes.flatten().find_map(differs)
+        })
+    }
+
+    /// The forced lights of a frame, against those of groups, one after the other.
+    fn of_forced<'g>(
+        &self,
+        rows: &[u32],
+        groups: impl Iterator<Item = &'g Group>,
+    ) -> Option<Contradiction> {
+        let mut rows = rows.iter();
+        for placed in groups.flat_map(|group| &group.forced) {
+            let row = rows.next().and_then(|&row| self.tree.instances().get(row as usize));
+            let is_so = row.is_some_and(|row| {
+                row.to_local == placed.to_local
+                    && (row.tree, row.first_emitter) == (placed.shared, placed.first_emitter)
+            });
+            if !is_so {
+                let path = self.light_of(placed.first_emitter);
+                return Some(Contradiction { path, what: "where it is placed" });
+            }
+        }
+        rows.next().map(|_| self.in_general("the number of forced lights"))
+    }
+
+    fn placed<'g>(&self, placed: &'g [PlacedLight], first: u32) -> Option<&'g PlacedLight> {
+        let at = placed.binary_search_by_key(&first, |placed| placed.first_emitter).ok()?;
+        Some(&placed[at])
+    }
+
+    /// The path of an emitter's light.
+    fn light_of(&self, emitter: u32) -> String {
+        let rows = self.tree.lights();
+        let behind = rows.partition_point(|row| row.first_emitter <= emitter);
+        let row = behind.checked_sub(1).and_then(|at| rows.get(at));
+        row.map_or_else(String::new, |row| self.tree.light_path(row).to_owned())
+    }
+
+    /// The path of the first light that a shared tree serves.
+    fn light_of_shared(&self, shared: usize) -> String {
+        let survey = self.survey;
+        let groups = std::iter::once(&survey.still).chain(survey.frames.iter().map(|(_, g)| g));
+        let mut placed = groups.flat_map(|group| group.placed.iter().chain(&group.forced));
+        let found = placed.find(|placed| placed.shared as usize == shared);
+        found.map_or_else(String::new, |placed| self.light_of(placed.first_emitter))
+    }
+
+    fn in_general(&self, what: &'static str) -> Contradiction {
+        Contradiction { path: String::new(), what }
+    }
+}
