@@ -19,32 +19,29 @@ pub const ASPECT: f32 = 16.0 / 9.0;
 /// Where the path of a camera's file ends.
 const FILES: [&str; 7] = [".gltf", ".glb", ".obj", ".usda", ".usdc", ".usdz", ".usd"];
 
-/// The field of view of a camera that stands where the options say, degrees.
-const YFOV_DEG: f32 = 40.0;
-
 /// What to look at a scene through.
 #[derive(Args, Clone, Debug, Default, PartialEq)]
 pub struct View {
-    /// Camera: its prim path or number in the scene; or FILE, for the first camera of another glTF file,
-    /// or FILE:CAMERA. The scene's first if not given; as by --fit if it has none
+    /// Camera to look through: a prim path or number in the scene; FILE for the first camera of another
+    /// glTF file; or FILE:CAMERA. If not given, the scene's first camera, or --fit if it has none
     #[arg(long)]
     pub camera: Option<String>,
-    /// Have the whole scene in view, whatever cameras it has
+    /// Put the whole scene in view, even if it has a camera
     #[arg(long, conflicts_with = "camera", group = "placed")]
     pub fit: bool,
     /// Look from a point, in metres, +Y up
     #[arg(long, value_name = "X,Y,Z", value_parser = option::point, allow_hyphen_values = true,
         conflicts_with = "camera", group = "placed")]
     pub look_from: Option<DVec3>,
-    /// Look at a point; the middle of the scene if not given
+    /// Look at a point; if not given, the middle of the scene
     #[arg(long, value_name = "X,Y,Z", value_parser = option::point, allow_hyphen_values = true,
         requires = "look_from")]
     pub look_at: Option<DVec3>,
-    /// The direction that is up in the picture; 0,1,0 if not given
+    /// Direction that is up in the picture; if not given, 0,1,0
     #[arg(long, value_name = "X,Y,Z", value_parser = option::point, allow_hyphen_values = true,
         requires = "look_from")]
     pub up: Option<DVec3>,
-    /// Vertical field of view in degrees, with --look-from or --fit; 40 if not given
+    /// Full vertical field of view in degrees, with --look-from or --fit; if not given, 40
     #[arg(long, value_name = "DEGREES", value_parser = option::field_of_view, requires = "placed")]
     pub fov: Option<f32>,
 }
@@ -115,7 +112,7 @@ pub fn look(scene: &mut Scene, view: &View, aspect: f32) -> Result<Look, ViewErr
     let own = |camera: Camera| Ok(Look { camera, note: None });
     if let Some(from) = view.look_from {
         let at = view.look_at.unwrap_or_else(|| fit::middle(scene));
-        let yfov_rad = view.fov.unwrap_or(YFOV_DEG).to_radians();
+        let yfov_rad = view.fov.unwrap_or(fit::YFOV_DEG as f32).to_radians();
         return own(stand(scene, from, at, view.up, yfov_rad)?);
     }
     if let Some(wanted) = &view.camera {

@@ -107,6 +107,9 @@ fn every_chunk_of_a_shot_has_the_same_view() {
         assert_eq!(view(&format!("--frames {frame}")), whole);
         assert!(shot.read(&format!("a.{frame}.exr")) == picture, "frame {frame}");
     }
+    // The camera that is added changes no light: a tree of the scene is fresh.
+    shot.candelabra(&format!("build {SCENE} --frames 1-25x8")).ends(0);
+    assert_eq!(view("--tree shot.ltree --frames 9"), whole);
 }
 
 #[test]

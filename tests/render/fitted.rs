@@ -128,6 +128,19 @@ fn strays_and_backdrops_do_not_shrink_it() {
     }
 }
 
+/// A small part of a large body is no reason to leave the body out.
+#[test]
+fn a_part_does_not_hide_the_whole() {
+    let mut stage = Stage::default();
+    stage.ball(5.0, 24, lambert(Vec3::splat(0.5)), at(DVec3::ZERO));
+    stage.mesh(cube(0.2, &[]), lambert(Vec3::ONE), at(DVec3::new(0.0, 3.5, 3.5)));
+    let all: Vec<DVec3> = [DVec3::X, DVec3::Y, DVec3::Z]
+        .into_iter()
+        .flat_map(|axis| [axis * 5.0, axis * -5.0])
+        .collect();
+    assert_framed("a ball with a badge", &mut stage.scene, &all);
+}
+
 #[test]
 fn lights_near_by_are_in_the_picture() {
     let mut stage = cube_stage(1.0, DVec3::ZERO, &[]);

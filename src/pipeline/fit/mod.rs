@@ -23,8 +23,8 @@ use sketch::Sketch;
 use std::fmt;
 use subject::Subject;
 
-/// The vertical field of view of a view from outside, degrees.
-const YFOV_DEG: f64 = 40.0;
+/// The vertical field of view of a view from outside, and of one that the user places, degrees.
+pub(super) const YFOV_DEG: f64 = 40.0;
 /// That of a view from inside a room.
 const YFOV_INSIDE_DEG: f64 = 60.0;
 

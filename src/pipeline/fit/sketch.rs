@@ -24,7 +24,7 @@ const MOST_LAMPS: usize = 32;
 /// What a side is worth that no light reaches.
 const DARK: f64 = 0.05;
 /// What a surface is worth that is seen from its back.
-const BACK: f64 = 0.5;
+const BACK: f64 = 0.7;
 /// The cosine from which on a surface counts in full.
 const STEEP: f32 = 0.3;
 

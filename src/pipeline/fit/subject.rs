@@ -15,8 +15,12 @@ const MOST_CORNERS: usize = 1 << 17;
 const MOST_POINTS: usize = 1 << 18;
 /// At most so many moments of a shot are looked at.
 const MOST_MOMENTS: usize = 16;
-/// What is so many times as large as all the rest surrounds it, and is not framed.
+/// A backdrop is so many times as large as all that is in front of it...
 const BACKDROP: f32 = 8.0;
+/// ...and either no thicker than this share of its size, as a ground is, or far from the rest, as a sky is.
+const FLAT: f32 = 0.05;
+/// At most so many vertices are asked whether they are far from the rest.
+const MOST_VERTICES: usize = 1 << 12;
 /// Lights are framed if they are so near to the rest, in diagonals of its box.
 const NEAR_LIGHT: f32 = 0.5;
 
@@ -55,7 +59,7 @@ impl Subject {
             }
         });
         let lamps: Vec<Aabb> = lamps.into_iter().filter(|lamp| !lamp.is_empty()).collect();
-        let (shown, lamps) = choose(scene, &boxes, &lamps);
+        let (shown, lamps) = choose(scene, moments[0], &boxes, &lamps);
         let mut points: Vec<DVec3> = lamps.iter().flat_map(corners).collect();
         let chosen =
             || (0..).zip(&shown).filter(|(_, shown)| **shown).map(|(row, _): (usize, _)| row);
@@ -118,7 +122,7 @@ impl Subject {
 }
 
 /// The instances that are shown, and the boxes of the lights that are.
-fn choose(scene: &Scene, boxes: &[Aabb], lamps: &[Aabb]) -> (Vec<bool>, Vec<Aabb>) {
+fn choose(scene: &Scene, moment: f64, boxes: &[Aabb], lamps: &[Aabb]) -> (Vec<bool>, Vec<Aabb>) {
     // What is scaled to a point, to hide it, cannot be seen.
     let is_seen = |row: &usize| boxes[*row].extent().max_element() > 0.0;
     let emits = |row: &usize| scene.peak_rgb_of_instance(*row as u32).max_element() > 0.0;
@@ -126,7 +130,10 @@ fn choose(scene: &Scene, boxes: &[Aabb], lamps: &[Aabb]) -> (Vec<bool>, Vec<Aabb
         (0..boxes.len()).filter(is_seen).partition(emits);
     // Meshes that shine are lights, unless there is nothing else.
     let plain = if plain.is_empty() { std::mem::take(&mut lit) } else { plain };
-    let kept = without_backdrops(boxes, without_strays(boxes, plain));
+    let pose = scene.pose_at(moment);
+    let kept = without_backdrops(boxes, without_strays(boxes, plain), |row, inside| {
+        is_backdrop(scene, &pose, row, &boxes[row], inside)
+    });
     let mut shown = vec![false; boxes.len()];
     kept.iter().for_each(|&row| shown[row] = true);
     if kept.is_empty() {
@@ -172,21 +179,46 @@ fn without_strays(boxes: &[Aabb], rows: Vec<usize>) -> Vec<usize> {
     rows.into_iter().filter(|&row| gap(row) <= limit).collect()
 }
 
-/// Leaves out what surrounds the rest: the largest boxes, if they are many times as large as all the
-/// others together. At least a third of the boxes stays.
-fn without_backdrops(boxes: &[Aabb], mut rows: Vec<usize>) -> Vec<usize> {
-    let size = |bounds: &Aabb| bounds.extent().max_element();
+/// Leaves out what is behind or below the rest: the largest boxes, if all of them are backdrops of the
+/// others. At least a third of the boxes stays.
+fn without_backdrops(
+    boxes: &[Aabb],
+    mut rows: Vec<usize>,
+    is_backdrop: impl Fn(usize, &Aabb) -> bool,
+) -> Vec<usize> {
     rows.sort_by(|&a, &b| size(&boxes[a]).total_cmp(&size(&boxes[b])).then(a.cmp(&b)));
     let mut inside = Aabb::EMPTY;
     for count in 1..rows.len() {
         inside = inside.union(&boxes[rows[count - 1]]);
         let is_surrounded = size(&boxes[rows[count]]) >= BACKDROP * size(&inside);
-        if 3 * count >= rows.len() && size(&inside) > 0.0 && is_surrounded {
+        if 3 * count >= rows.len()
+            && is_surrounded
+            && rows[count..].iter().all(|&row| is_backdrop(row, &inside))
+        {
             rows.truncate(count);
             break;
         }
     }
     rows
+}
+
+/// Whether a large instance is a backdrop of what is in a box, and not a body that the box is a part of.
+fn is_backdrop(scene: &Scene, pose: &Pose, row: usize, bounds: &Aabb, inside: &Aabb) -> bool {
+    if bounds.extent().min_element() <= FLAT * size(bounds) {
+        return true;
+    }
+    let instance = &scene.instances[row];
+    let positions = &scene.meshes[instance.mesh as usize].positions;
+    let world = pose.world(instance.node);
+    let margin = Vec3::splat(size(inside));
+    let near = Aabb { min: inside.min - margin, max: inside.max + margin };
+    let stride = positions.len().div_ceil(MOST_VERTICES).max(1);
+    positions.iter().step_by(stride).all(|&p| !near.contains(world.transform_point3(p)))
+}
+
+/// The longest edge.
+fn size(bounds: &Aabb) -> f32 {
+    bounds.extent().max_element()
 }
 
 /// The distance beyond which what few points have is a slip: 8 times that of nine points in ten, or 64
