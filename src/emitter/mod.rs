@@ -1,12 +1,15 @@
 //! Floor 2: scene -> emitters, their bounds, and light from a point of them.
 //!
 //! [`Emitters`] lists what a scene's lights are made of: triangles of mesh lights, spheres, points
-//! and spots, in canonical order. [`PosedEmitters`] puts them where a frame has them: it gives the
-//! bounds that a tree is built over, takes a sample of one emitter for a receiver, and tells the
-//! radiance and the sampling density of one that a ray has hit, so that both ways of finding light
-//! can be weighed against each other. [`InfiniteLight`]s, suns and domes, stay outside the tree.
+//! and spots, in canonical order. Finding them is quick but for emission textures, whose means over
+//! triangles ([`TextureMeans`]) take time; a tree file keeps them.
 //!
-//! This room does not know the tree; which emitter to sample is decided elsewhere.
+//! [`PosedEmitters`] puts the emitters where a frame has them. It gives the bounds that a tree is
+//! built over. It takes a sample of one emitter for a receiver. And it tells the radiance and the
+//! sampling density of an emitter that a ray has hit, so that both ways of finding light can be
+//! weighed against each other. [`InfiniteLight`]s, suns and domes, stay outside the tree.
+//!
+//! This room does not know the tree: which emitter to sample is decided elsewhere.
 
 mod beam;
 mod bounding;
