@@ -139,7 +139,8 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     if is_partial {
         return Ok(());
     }
-    let with = with_file(arguments, &scene, &output)?;
+    // Somebody else may have written another tree there since.
+    let Ok(with) = with_file(arguments, &scene, &output) else { return Ok(()) };
     let without = match survey.frames.len() {
         0 | 1 => collecting + surveying + building,
         _ => collecting + without_file(&scene, &emitters, frames[0])?,
@@ -160,7 +161,7 @@ fn collect(scene: &Scene) -> Emitters {
 }
 
 /// What a process spends that renders with the file, between reading the scene and its first frame.
-fn with_file(arguments: &Arguments, scene: &Scene, output: &Path) -> Result<Duration> {
+fn with_file(arguments: &Arguments, scene: &Scene, output: &Path) -> Result<Duration, TreeError> {
     let (checked, with) = timed(|| {
         let tree = pipeline::open_tree(output, true)?;
         let emitters = pipeline::collect_emitters(scene, Some(&tree), &|_, _| {});
