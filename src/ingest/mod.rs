@@ -16,6 +16,7 @@
 #![doc = include_str!("carriers.md")]
 
 mod budget;
+mod census;
 mod error;
 mod extent;
 mod gltf;
@@ -29,6 +30,7 @@ mod uri;
 pub use error::IngestError;
 
 use crate::scene::Scene;
+use crate::store::read_regular;
 use error::Fault;
 use std::path::Path;
 
@@ -42,16 +44,24 @@ pub fn load(path: &Path) -> Result<Scene, IngestError> {
         _ => Err(Fault::new("file", "is in a format that is not read")
             .remedy("convert it to .gltf, .glb or .obj; USD with scripts/usd_to_gltf.py")),
     };
-    let checked = scene.and_then(|scene| extent::check(&scene).map(|()| scene));
+    let checked = scene.and_then(|scene| {
+        extent::check(&scene)?;
+        census::check(&scene)?;
+        Ok(scene)
+    });
     match checked {
         Ok(scene) => Ok(Scene { source: path.to_path_buf(), ..scene }),
         Err(fault) => Err(fault.in_file(path)),
     }
 }
 
+/// No file is read that is larger: a GLB counts its bytes in 32 bits, and text of this length takes many
+/// times as much memory.
+const MOST_FILE_BYTES: u64 = 4 << 30;
+
 /// The bytes of the scene file itself.
 fn read_file(path: &Path) -> Result<Vec<u8>, Fault> {
-    std::fs::read(path).map_err(|error| {
+    read_regular(path, MOST_FILE_BYTES).map_err(|error| {
         Fault::new("file", format!("cannot be read: {error}")).remedy("check the path")
     })
 }

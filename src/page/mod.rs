@@ -8,6 +8,7 @@
 //! | file | what |
 //! |---|---|
 //! | `escape` | text that stays text |
+//! | `plain` | text that a terminal does not obey: [`Plain`], [`Lines`] |
 //! | `table` | a [`Table`] that sorts |
 //! | `plan` | a [`Plan`]: marks in space, from above and from the front |
 //! | `view`, `axes` | one way of looking at it, and the ticks around it |
@@ -20,6 +21,7 @@ mod axes;
 mod escape;
 mod heat;
 mod number;
+mod plain;
 mod plan;
 mod raster;
 mod shade;
@@ -28,6 +30,7 @@ mod view;
 
 pub use heat::{HeatMap, Scale};
 pub use number::{Count, Short, Triple, counted};
+pub use plain::{Lines, Plain, plain_json};
 pub use plan::{Cuboid, Level, Mark, Plan};
 pub use table::{Cell, Column, Table};
 

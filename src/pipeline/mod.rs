@@ -11,6 +11,7 @@ mod forced;
 mod frames;
 mod fresh;
 mod look;
+mod strict;
 mod survey;
 
 pub use build::{Rebuilt, build_tree, rebuild_tree};
@@ -19,9 +20,10 @@ pub use content::scene_fingerprint;
 pub use forced::{NoLightThere, force_lights};
 pub use frames::frames_of;
 pub use fresh::{
-    OpenedTree, StaleTree, TreeError, check_fresh, is_tree_file, open_base, open_tree,
+    OpenedTree, StaleTree, TreeError, check_fresh, check_output, is_tree_file, open_base, open_tree,
 };
 pub use look::is_built_from;
+pub use strict::{Strict, StrictError};
 pub use survey::{Group, PlacedLight, SharedBounds, Survey, survey};
 
 use crate::ingest::{self, IngestError};

@@ -44,6 +44,13 @@ fn replace(
         _ => Path::new("."),
     };
     fs::create_dir_all(folder)?;
+    // A rename would put a file in the place of a device or a pipe.
+    if let Ok(there) = fs::metadata(path)
+        && !(there.is_file() || there.is_dir())
+    {
+        let problem = "is a device or a pipe; choose another output";
+        return Err(io::Error::new(io::ErrorKind::InvalidInput, problem));
+    }
     let mut builder = Builder::new();
     builder.prefix(".candelabra-").suffix(".part");
     // A temporary file is private by default; an output is as open as the user's mask allows.

@@ -39,7 +39,7 @@ fn objects_emit_by_their_material() {
     assert!((wall.roughness - (2.0f32 / 12.0).powf(0.25)).abs() < 1e-6);
     assert_eq!(scene.meshes[1].triangles.len(), 2);
     assert_eq!(scene.notes.len(), 1);
-    assert!(scene.notes[0].contains("absent.png"), "{:?}", scene.notes);
+    assert!(scene.notes[0].text.contains("absent.png"), "{:?}", scene.notes);
 }
 
 #[test]
@@ -49,7 +49,7 @@ fn stale_references_are_noted() {
         let obj = format!("mtllib {library}\nusemtl a\n{TRIANGLE}f 1 2 3\n");
         let scene = load_in(folder.path(), &obj).unwrap();
         assert_eq!(scene.meshes[0].material, None);
-        assert!(scene.notes[0].contains("material library"), "{library}: {:?}", scene.notes);
+        assert!(scene.notes[0].text.contains("material library"), "{library}: {:?}", scene.notes);
     }
 }
 
@@ -64,7 +64,7 @@ fn numbers_that_are_not_finite_are_left_out() {
     assert_eq!(mesh.triangles.len(), 1);
     assert!(mesh.positions.iter().all(|position| position.is_finite()));
     assert!(mesh.normals.iter().all(|normal| normal.is_normalized()));
-    assert!(scene.notes[0].contains("not finite"), "{:?}", scene.notes);
+    assert!(scene.notes[0].text.contains("not finite"), "{:?}", scene.notes);
 }
 
 #[test]

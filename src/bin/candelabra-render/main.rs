@@ -5,6 +5,7 @@ mod progress;
 mod shot;
 
 use arguments::Arguments;
+use candelabra::page::Plain;
 use candelabra::pipeline::TreeError;
 use candelabra::render::frame_names::FrameNamesError;
 use clap::Parser;
@@ -27,7 +28,7 @@ fn main() -> ExitCode {
             ExitCode::from(FAILED)
         }
         Err(error) => {
-            eprintln!("candelabra-render: {error:#}");
+            eprintln!("candelabra-render: {}", Plain(format_args!("{error:#}")));
             ExitCode::from(match error {
                 error if is_bad_tree(&error) => BAD_TREE,
                 error if error.is::<FrameNamesError>() => USAGE,

@@ -5,6 +5,7 @@ use crate::progress::Bar;
 use anyhow::{Context, Result, bail};
 use candelabra::emitter::Emitters;
 use candelabra::light_tree::{ALGORITHM_VERSION, LightTree};
+use candelabra::page::Plain;
 use candelabra::pipeline;
 use candelabra::render::exr::{ExrOptions, read_metadata, write_exr};
 use candelabra::render::frames::Frames;
@@ -22,13 +23,16 @@ pub fn render(arguments: &Arguments) -> Result<usize> {
         rayon::ThreadPoolBuilder::new().num_threads(threads.into()).build_global()?;
     }
     let mut scene = pipeline::load_scene(&arguments.scene)?;
+    for note in &scene.notes {
+        eprintln!("note: {}", Plain(note));
+    }
+    if let Some(strict) = &arguments.strict {
+        strict.check(&scene)?;
+    }
     pipeline::force_lights(&mut scene, &arguments.force_light)
         .with_context(|| arguments.scene.display().to_string())?;
     if let Some(fog) = &arguments.fog {
         scene.medium = Some(fog.clone());
-    }
-    for note in &scene.notes {
-        eprintln!("note: {note}");
     }
     let frames = match &arguments.frames {
         Some(frames) => frames.clone(),

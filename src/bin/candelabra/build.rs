@@ -3,8 +3,8 @@
 use anyhow::{Context, Result, bail};
 use candelabra::emitter::Emitters;
 use candelabra::light_tree::LightTree;
-use candelabra::page::counted;
-use candelabra::pipeline::{self, OpenedTree, Rebuilt, Survey, TreeError};
+use candelabra::page::{Lines, Plain, counted};
+use candelabra::pipeline::{self, OpenedTree, Rebuilt, Strict, Survey, TreeError};
 use candelabra::render::frames::Frames;
 use candelabra::store::{AlignedBytes, write_atomically};
 use clap::Args;
@@ -37,6 +37,10 @@ pub struct Arguments {
     /// Build even if the output is up to date, and all of it
     #[arg(long, conflicts_with = "base")]
     force: bool,
+    /// Take notes about the scene for errors: all, or those of the categories given, such as
+    /// --strict=lights,cameras (lights, materials, geometry, cameras, animation, other)
+    #[arg(long, value_name = "CATEGORIES", num_args = 0..=1, require_equals = true, default_missing_value = Strict::EVERYTHING)]
+    strict: Option<Strict>,
 }
 
 pub fn run(arguments: &Arguments) -> Result<()> {
@@ -44,7 +48,8 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         rayon::ThreadPoolBuilder::new().num_threads(threads.into()).build_global()?;
     }
     let output = arguments.output.clone().unwrap_or(arguments.scene.with_extension("ltree"));
-    let mut out = std::io::stdout().lock();
+    pipeline::check_output(&output)?;
+    let mut out = Lines(std::io::stdout().lock());
 
     let load = || {
         let started = Instant::now();
@@ -57,11 +62,14 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     };
     let (loaded, (before, base)) = rayon::join(load, open);
     let (mut scene, loading) = loaded?;
+    for note in &scene.notes {
+        eprintln!("note: {}", Plain(note));
+    }
+    if let Some(strict) = &arguments.strict {
+        strict.check(&scene)?;
+    }
     pipeline::force_lights(&mut scene, &arguments.force_light)
         .with_context(|| arguments.scene.display().to_string())?;
-    for note in &scene.notes {
-        eprintln!("note: {note}");
-    }
     let real = |path: &Path| path.canonicalize().ok();
     if scene.files.iter().any(|input| real(input).is_some() && real(input) == real(&output)) {
         bail!("{}: is the scene's own file; choose another output", output.display());
@@ -94,7 +102,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         None => before,
         Some(Ok(base)) => Some(base),
         Some(Err(error)) => {
-            eprintln!("note: not built upon {error}");
+            eprintln!("note: not built upon {}", Plain(error));
             None
         }
     };

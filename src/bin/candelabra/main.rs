@@ -9,6 +9,7 @@ mod race;
 mod shot;
 mod verify;
 
+use candelabra::page::Plain;
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
 
@@ -52,7 +53,7 @@ fn main() -> ExitCode {
         // A reader that has seen enough (`| head`) is no failure.
         Err(error) if is_closed_pipe(&error) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("candelabra: {error:#}");
+            eprintln!("candelabra: {}", Plain(format_args!("{error:#}")));
             match command {
                 Command::Diff(_) => diff::TROUBLE.into(),
                 _ => ExitCode::FAILURE,

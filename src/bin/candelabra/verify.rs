@@ -1,7 +1,7 @@
 //! `candelabra verify`: whether tree files are what the format says.
 
 use anyhow::Result;
-use candelabra::page::counted;
+use candelabra::page::{Lines, Plain, counted};
 use candelabra::pipeline::{self, OpenedTree, TreeError};
 use candelabra::store::StoreError;
 use clap::Args;
@@ -27,7 +27,7 @@ pub struct Arguments {
 
 /// Checks each file and says of each what it is, whatever the others are. The worst decides the code.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
-    let mut out = std::io::stdout().lock();
+    let mut out = Lines(std::io::stdout().lock());
     let mut worst = 0;
     for file in &arguments.files {
         let name = file.display();
@@ -46,7 +46,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
                 UNSOUND
             }
             Err(error) => {
-                eprintln!("candelabra: {error}");
+                eprintln!("candelabra: {}", Plain(error));
                 TROUBLE
             }
         });

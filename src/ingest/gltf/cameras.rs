@@ -3,8 +3,9 @@
 use super::document::{UsdCamera, reals};
 use super::{Output, Source};
 use crate::ingest::error::Fault;
-use crate::scene::Camera;
+use crate::scene::{Camera, Category};
 use gltf::json::{Camera as Row, Index, Node};
+use std::f32::consts::PI;
 
 /// Adds the camera of a node.
 pub(super) fn compile(
@@ -15,14 +16,27 @@ pub(super) fn compile(
     node: u32,
     object: &str,
 ) -> Result<(), Fault> {
-    let Some(lens) = &source.document.cameras[camera.value()].perspective else {
-        output.notes.add(object, "orthographic cameras are not read; left out");
+    let mut note = |text| output.notes.add(Category::Cameras, object, text);
+    let Some(camera) = source.document.get(camera) else {
+        note("its camera is not in the file; left out");
         return Ok(());
     };
+    let Some(lens) = &camera.perspective else {
+        note("orthographic cameras are not read; left out");
+        return Ok(());
+    };
+    if !(lens.yfov > 0.0 && lens.yfov < PI) {
+        note("the field of view of its camera is not between 0 and pi radians; left out");
+        return Ok(());
+    }
+    let aspect = lens.aspect_ratio.filter(|&aspect| aspect > 0.0 && aspect.is_finite());
+    if aspect != lens.aspect_ratio {
+        note("the aspect ratio of its camera is not positive; it has none");
+    }
     let mut compiled = Camera {
         node,
         yfov_rad: lens.yfov,
-        aspect: lens.aspect_ratio,
+        aspect,
         lens_radius_m: 0.0,
         focus_distance_m: 0.0,
         film_offset: [0.0; 2],
