@@ -6,6 +6,8 @@ mod disk;
 mod files;
 mod inspect;
 mod lights;
+mod names;
+mod notes;
 mod pages;
 mod render;
 mod resume;

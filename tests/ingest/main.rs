@@ -5,6 +5,7 @@ mod files;
 mod fog;
 mod gltf;
 mod malformed;
+mod mended;
 mod obj;
 #[path = "../fuzz/probe/scene.rs"]
 mod probe;

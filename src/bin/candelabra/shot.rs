@@ -10,6 +10,7 @@ use clap::Args;
 use std::path::PathBuf;
 
 #[derive(Args)]
+#[group(skip)]
 pub struct Arguments {
     /// The scene: .gltf, .glb or .obj
     scene: PathBuf,

@@ -15,11 +15,14 @@ use std::collections::HashMap;
 /// How a texture's image is sampled: wrapping, bilinear or not, and what its values mean.
 type Rule = ([Wrap; 2], bool, Coding);
 
+/// A number of the scene's textures, or why there is none.
+type Compiled = Result<u32, String>;
+
 /// The textures that were compiled.
 #[derive(Default)]
 pub(super) struct Textures {
-    /// By image; few rules exist. Images that cannot be read have the reason.
-    compiled: HashMap<Index<Image>, Vec<(Rule, Result<u32, String>)>>,
+    /// By image; few rules exist.
+    compiled: HashMap<Index<Image>, Vec<(Rule, Compiled)>>,
 }
 
 impl Textures {

@@ -71,14 +71,15 @@ impl Document {
                 Asset { version: "2.0".into(), ..Asset::default() }
             }
         };
-        let lights = Kind("light", Category::Lights, r#"{"type": "none"}"#);
+        let lights = Kind("light", Category::Lights, r#"{"type": "point", "intensity": 0}"#);
         let lights = tables
             .within("extensions", "KHR_lights_punctual")?
             .map_or(Ok(Vec::new()), |mut punctual| {
                 punctual.table("lights", &lights, |row, _| beside::light(row))
             })?;
-        let node = Kind("node", Category::Geometry, "{}");
-        let mesh = Kind("mesh", Category::Geometry, r#"{"primitives": []}"#);
+        // Whether what is left out would emit is not known.
+        let node = Kind("node", Category::Lights, "{}");
+        let mesh = Kind("mesh", Category::Lights, r#"{"primitives": []}"#);
         let accessor = Kind(
             "accessor",
             Category::Geometry,
@@ -86,7 +87,6 @@ impl Document {
         );
         let view = Kind("buffer view", Category::Geometry, r#"{"buffer": 0, "byteLength": 0}"#);
         let buffer = Kind("buffer", Category::Geometry, r#"{"byteLength": 0}"#);
-        // Whether the material emits is not known.
         let material = Kind("material", Category::Lights, "{}");
         let texture = Kind("texture", Category::Materials, "{}");
         let image = Kind("image", Category::Materials, "{}");
@@ -180,14 +180,22 @@ impl<'a> Tables<'a, '_> {
         kind: &Kind,
         mut prepare: impl FnMut(&mut Row, usize) -> Result<(), Box<dyn Error>>,
     ) -> Result<Vec<T>, Fault> {
-        let rows: Vec<&RawValue> = self.optional(key)?.unwrap_or_default();
-        self.budget.take((rows.len() * size_of::<T>()) as u64, || key.to_string())?;
         let Kind(name, category, spare) = *kind;
+        let rows: Vec<&RawValue> = match self.optional(key) {
+            Ok(rows) => rows.unwrap_or_default(),
+            Err(fault) => {
+                let text = format!("{}; all are left out", fault.into_problem());
+                self.notes.add(category, key, text);
+                return Ok(Vec::new());
+            }
+        };
+        let text: u64 = rows.iter().map(|row| weight(row.get())).sum();
+        self.budget.take(text + (rows.len() * size_of::<T>()) as u64, || key.to_string())?;
         let mut parse = |json: &str, i: usize| -> Result<T, Fault> {
             let mut value: Value =
                 serde_json::from_str(json).map_err(|e| Fault::new(label(name, i, None), e))?;
-            let object = label(name, i, value.get("name").and_then(Value::as_str));
-            let fault = |problem: &dyn Display| Fault::new(&object, problem);
+            let own = value.get("name").and_then(Value::as_str).map(String::from);
+            let fault = |problem: &dyn Display| Fault::new(label(name, i, own.as_deref()), problem);
             let row = value.as_object_mut().ok_or_else(|| fault(&"is not an object"))?;
             reference::check(row).map_err(|problem| fault(&problem))?;
             prepare(row, i).map_err(|problem| fault(&problem))?;
@@ -195,7 +203,6 @@ impl<'a> Tables<'a, '_> {
         };
         let mut parsed = Vec::with_capacity(rows.len());
         for (i, row) in rows.into_iter().enumerate() {
-            self.budget.take(weight(row.get()), || label(name, i, None))?;
             let row = match parse(row.get(), i) {
                 Ok(row) => row,
                 Err(fault) => {
