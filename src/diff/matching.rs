@@ -1,10 +1,14 @@
-//! Which light of one version is which of the other.
+//! Which light of one version is which of the other: content first, place in the file last.
 //!
-//! A light is known by its path. Of those that are left, two are the same light under another name if
-//! nothing else of them differs; and of those that are left then, if their last names and their looks
-//! agree: they were carried along by a prim above them. Many equal ones pair in the order of their
-//! paths. The order in which the versions list their lights does not matter.
+//! A path that the file gives identifies a light, whatever changed of it. A path that ingest made unique
+//! ([`family`](super::family)) only tells where in its file a light stands. So lights of one family are
+//! the same if nothing of them differs; what is left of a family pairs in order of place.
+//! Lights of different paths are the same under another name if nothing else differs. Of those that are
+//! left then, lights whose last names and looks agree were carried along by a prim above them.
+//! Where several are equal, they pair in order of their paths. The order in which a version lists its
+//! lights does not matter.
 
+use super::family::Families;
 use super::light::Light;
 use rayon::prelude::*;
 use std::cmp::Ordering;
@@ -12,9 +16,9 @@ use std::cmp::Ordering;
 /// Which light is which, by rows of either list.
 #[derive(Debug, Default, PartialEq, Eq)]
 pub(super) struct Matching {
-    /// Of the same path, in the order of that.
-    pub same_path: Vec<(u32, u32)>,
-    /// Of different paths.
+    /// The same light under the same name.
+    pub same: Vec<(u32, u32)>,
+    /// The same light under another name.
     pub renamed: Vec<(u32, u32)>,
     /// Those that only the version before has.
     pub removed: Vec<u32>,
@@ -24,13 +28,104 @@ pub(super) struct Matching {
 
 /// Matches two lists of lights.
 pub(super) fn matching(before: &[Light], after: &[Light]) -> Matching {
+    let lists = [before, after];
     let all = |lights: &[Light]| (0..lights.len() as u32).collect::<Vec<u32>>();
-    let join = |rows, key| join([before, after], rows, key);
-    let (same_path, left) = join([all(before), all(after)], by_path);
-    let (mut renamed, left) = join(left, by_content);
-    let (carried, [removed, added]) = join(left, by_look);
+    let join = |rows, key| join(lists, rows, key);
+    let (pairs, mut left) = join([all(before), all(after)], by_path);
+    let is_unchanged = |&(b, a): &(u32, u32)| before[b as usize].has_content_of(&after[a as usize]);
+    let (mut same, changed): (Vec<_>, Vec<_>) = pairs.into_iter().partition(is_unchanged);
+    left[0].extend(changed.iter().map(|pair| pair.0));
+    left[1].extend(changed.iter().map(|pair| pair.1));
+    if left.iter().any(Vec::is_empty) {
+        return Matching {
+            same,
+            renamed: Vec::new(),
+            removed: left[0].clone(),
+            added: left[1].clone(),
+        };
+    }
+
+    let families = Families::of(lists, &left);
+    let (numbered, left) = divide(lists, left, &families);
+    let (pairs, numbered) = join_families(lists, numbered, |light| Some(light.fingerprint));
+    same.extend(pairs);
+    let (pairs, left) = join(left, by_path);
+    same.extend(pairs);
+    let [mut b, mut a] = left;
+    b.extend(numbered[0].iter().map(|row| row.0));
+    a.extend(numbered[1].iter().map(|row| row.0));
+    let (mut renamed, left) = join([b, a], by_content);
+    let (numbered, [mut b, mut a]) = divide(lists, left, &families);
+    let (pairs, numbered) = join_families(lists, numbered, |_| None);
+    same.extend(pairs);
+    b.extend(numbered[0].iter().map(|row| row.0));
+    a.extend(numbered[1].iter().map(|row| row.0));
+    let (carried, [removed, added]) = join([b, a], by_look);
     renamed.extend(carried);
-    Matching { same_path, renamed, removed, added }
+    same.sort_by(|x, y| by_path(&after[x.1 as usize], &after[y.1 as usize]));
+    Matching { same, renamed, removed, added }
+}
+
+/// Rows of lights with their families.
+type Numbered = Vec<(u32, String)>;
+
+/// Divides rows into those of numbered families and all others.
+fn divide(
+    lists: [&[Light]; 2],
+    rows: [Vec<u32>; 2],
+    families: &Families,
+) -> ([Numbered; 2], [Vec<u32>; 2]) {
+    let (mut numbered, mut others) = <([Numbered; 2], [Vec<u32>; 2])>::default();
+    for side in 0..2 {
+        for &row in &rows[side] {
+            match families.family(side, lists[side][row as usize].path) {
+                Some(family) => numbered[side].push((row, family)),
+                None => others[side].push(row),
+            }
+        }
+    }
+    (numbered, others)
+}
+
+/// Pairs lights of one family that agree in a key, equal ones in the order of their paths; and what is
+/// left of either version.
+fn join_families<K: Ord>(
+    lists: [&[Light]; 2],
+    mut rows: [Numbered; 2],
+    key: impl Fn(&Light) -> K,
+) -> (Vec<(u32, u32)>, [Numbered; 2]) {
+    let order = |side: usize, (row, family): &(u32, String)| {
+        (family.clone(), key(&lists[side][*row as usize]))
+    };
+    for side in 0..2 {
+        let path = |row: u32| lists[side][row as usize].path;
+        rows[side].sort_by(|a, b| {
+            let (x, y) = (order(side, a), order(side, b));
+            // Shorter first: 9 comes before 10.
+            let place = |row: u32| (path(row).len(), path(row));
+            x.cmp(&y).then_with(|| place(a.0).cmp(&place(b.0)))
+        });
+    }
+    let (mut pairs, mut rest) = (Vec::new(), <[Numbered; 2]>::default());
+    let [before, after] = rows;
+    let (mut before, mut after) = (before.into_iter().peekable(), after.into_iter().peekable());
+    loop {
+        let order = match (before.peek(), after.peek()) {
+            (Some(b), Some(a)) => order(0, b).cmp(&order(1, a)),
+            (Some(_), None) => Ordering::Less,
+            (None, Some(_)) => Ordering::Greater,
+            (None, None) => return (pairs, rest),
+        };
+        let b = if order.is_le() { before.next() } else { None };
+        let a = if order.is_ge() { after.next() } else { None };
+        match (b, a) {
+            (Some(b), Some(a)) => pairs.push((b.0, a.0)),
+            (b, a) => {
+                rest[0].extend(b);
+                rest[1].extend(a);
+            }
+        }
+    }
 }
 
 type Order = fn(&Light, &Light) -> Ordering;
@@ -112,7 +207,56 @@ mod tests {
         let before = [light("/a", 1), light("/b", 2)];
         let after = [light("/b", 1), light("/a", 2)];
         let found = matching(&before, &after);
-        assert_eq!(found, Matching { same_path: vec![(0, 1), (1, 0)], ..Default::default() });
+        assert_eq!(found, Matching { same: vec![(0, 1), (1, 0)], ..Default::default() });
+    }
+
+    #[test]
+    fn of_equal_names_content_goes_before_the_place_in_the_file() {
+        let named = |contents: &[u8]| -> Vec<(String, u8)> {
+            let path =
+                |i| if i == 0 { "/room/lamp".into() } else { format!("/room/lamp_{}", i + 1) };
+            contents.iter().enumerate().map(|(i, &content)| (path(i), content)).collect()
+        };
+        let lights = |named: &'static [(String, u8)]| -> Vec<Light<'static>> {
+            named.iter().map(|(path, content)| light(path, *content)).collect()
+        };
+        let of = |contents: &[u8]| lights(named(contents).leak());
+        for (before, after, same, changed) in [
+            // Another order.
+            (&[1, 2, 3, 4][..], &[3, 2, 4, 1][..], 4, 0),
+            // One is put before all others, or taken away there.
+            (&[1, 2, 3], &[9, 1, 2, 3], 3, 1),
+            (&[9, 1, 2, 3], &[1, 2, 3], 3, 1),
+            // Another order, and one changes; many are equal.
+            (&[1, 2, 3, 4], &[4, 9, 1, 3], 3, 1),
+            (&[5; 12], &[5; 12], 12, 0),
+        ] {
+            let (before, after) = (of(before), of(after));
+            let found = matching(&before, &after);
+            let is_same = |&(b, a): &(u32, u32)| {
+                before[b as usize].fingerprint == after[a as usize].fingerprint
+            };
+            let unchanged = found.same.iter().filter(|pair| is_same(pair)).count();
+            let others = found.same.len() - unchanged + found.removed.len() + found.added.len();
+            assert_eq!((unchanged, others), (same, changed), "{found:?}");
+            assert!(found.renamed.is_empty());
+        }
+    }
+
+    #[test]
+    fn lights_without_a_name_are_known_by_their_content() {
+        let before = [light("/node_3", 1), light("/node_4", 2), light("/rig/node_9", 3)];
+        let after = [light("/node_4", 1), light("/node_5", 2), light("/rig/node_11", 3)];
+        let found = matching(&before, &after);
+        assert_eq!((found.same.len(), found.renamed.len()), (3, 0), "{found:?}");
+    }
+
+    #[test]
+    fn numbers_that_an_author_gave_are_names() {
+        let before = [light("/lamp_1", 1), light("/lamp_2", 2)];
+        let after = [light("/lamp_1", 2), light("/lamp_2", 1)];
+        let found = matching(&before, &after);
+        assert_eq!(found, Matching { same: vec![(0, 0), (1, 1)], ..Default::default() });
     }
 
     #[test]
@@ -140,7 +284,7 @@ mod tests {
         let mut after: Vec<Light> = names[5..].iter().map(|name| light(name, 2)).collect();
         let paths = |after: &[Light]| {
             let found = matching(&before, after);
-            let pairs = found.same_path.iter();
+            let pairs = found.same.iter();
             let pairs = pairs.map(|&(b, a)| (before[b as usize].path, after[a as usize].path));
             let removed = found.removed.iter().map(|&b| before[b as usize].path);
             (

@@ -29,6 +29,7 @@ mod card;
 mod change;
 mod compare;
 mod describe;
+mod family;
 mod folder;
 mod heat;
 mod html;

@@ -61,9 +61,9 @@ impl<'a> Pairs<'a> {
         for (&row, number) in found.added.iter().zip(before.len() as u32..) {
             pairs.number_of_after[row as usize] = number;
         }
-        let same_path = found.same_path.iter().map(|pair| (pair, Verb::Dirtied));
+        let same = found.same.iter().map(|pair| (pair, Verb::Dirtied));
         let renamed = found.renamed.iter().map(|pair| (pair, Verb::Renamed));
-        for (&(b, a), verb) in same_path.chain(renamed) {
+        for (&(b, a), verb) in same.chain(renamed) {
             pairs.number_of_after[a as usize] = b;
             let (then, now) = (before[b as usize], after[a as usize]);
             if verb == Verb::Dirtied && then.has_content_of(&now) {
