@@ -10,6 +10,7 @@
 //! `null`.
 
 use super::{Diff, FolderDiff};
+use crate::page::plain_json;
 use serde::Serialize;
 use std::io::{self, Write};
 
@@ -46,6 +47,6 @@ impl FolderDiff {
 
 fn write(out: &mut impl Write, content: &impl Serialize) -> io::Result<()> {
     let document = Document { schema: "candelabra.diff", version: SCHEMA_VERSION, content };
-    serde_json::to_writer(&mut *out, &document).map_err(io::Error::from)?;
-    writeln!(out)
+    let json = serde_json::to_string(&document).map_err(io::Error::from)?;
+    writeln!(out, "{}", plain_json(&json))
 }

@@ -142,7 +142,8 @@ impl Emitters {
         let (mut count, mut blocks) = (0u32, Vec::new());
         for (row, entry) in (0..).zip(&mut lights) {
             entry.first = count;
-            count += entry.count;
+            // `ingest` refuses scenes of more.
+            count = count.checked_add(entry.count).expect("a scene has fewer than 2^30 emitters");
             while (blocks.len() as u32) < count.div_ceil(BLOCK) {
                 blocks.push(row);
             }

@@ -11,17 +11,18 @@ pub(super) struct Budget {
 }
 
 impl Budget {
-    /// For nodes, vertices and keys.
+    /// For rows of the file, nodes, vertices and keys. A node of a few letters takes a hundred times as
+    /// much memory.
     pub(super) fn for_geometry() -> Budget {
-        Budget { left_bytes: 1 << 30, bytes_per_byte: 64 }
+        Budget { left_bytes: 256 << 20, bytes_per_byte: 128 }
     }
 
     /// For pictures: one of a single colour compresses a thousandfold, so more to begin with.
     pub(super) fn for_pictures() -> Budget {
-        Budget { left_bytes: 4 << 30, bytes_per_byte: 256 }
+        Budget { left_bytes: 2 << 30, bytes_per_byte: 256 }
     }
 
-    /// Notes that bytes were read which the memory can be asked for.
+    /// Says that bytes were read which the memory can be asked for.
     pub(super) fn grow(&mut self, held_bytes: u64) {
         let more = held_bytes.saturating_mul(self.bytes_per_byte);
         self.left_bytes = self.left_bytes.saturating_add(more);

@@ -39,9 +39,19 @@ impl Fault {
         self
     }
 
-    /// What is wrong, without the object: for a note where the object is optional.
+    /// What is wrong, without the object: for a note about it.
     pub(super) fn into_problem(self) -> String {
         self.problem
+    }
+
+    /// The object, and what is wrong with it.
+    pub(super) fn parts(self) -> (String, String) {
+        (self.object, self.problem)
+    }
+
+    /// What is wrong with which object: for a note about one that uses it.
+    pub(super) fn told(self) -> String {
+        format!("{}: {}", self.object, self.problem)
     }
 
     pub(super) fn in_file(self, file: &Path) -> IngestError {

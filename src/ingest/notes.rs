@@ -1,14 +1,21 @@
-//! What the file holds and the scene does not.
+//! Collects notes: what the file holds and the scene does not.
 
+use crate::scene::{Category, Note};
 use std::collections::BTreeMap;
 
-/// How many objects a note names before it counts the rest.
-const NAMED: usize = 3;
+/// A note names this many objects and counts the others.
+const MOST_NAMED: usize = 3;
 
-/// Collects notes; objects with the same one share a line.
+/// A category holds this many different texts; what comes later shares one text.
+const MOST_TEXTS: usize = 100;
+
+/// The text of what comes later.
+const MORE: &str = "more is left out or mended than can be told one by one";
+
+/// The notes of a file. Objects with the same text share a note.
 #[derive(Default)]
 pub(super) struct Notes {
-    objects_by_text: BTreeMap<String, Objects>,
+    by_text: BTreeMap<(Category, String), Objects>,
 }
 
 #[derive(Default)]
@@ -18,28 +25,41 @@ struct Objects {
 }
 
 impl Notes {
-    pub(super) fn add(&mut self, object: impl Into<String>, text: impl Into<String>) {
-        let objects = self.objects_by_text.entry(text.into()).or_default();
+    /// Adds a note. The text should not repeat what differs between objects, so that they share it.
+    pub(super) fn add(
+        &mut self,
+        category: Category,
+        object: impl Into<String>,
+        text: impl Into<String>,
+    ) {
+        let mut key = (category, text.into());
+        if !self.by_text.contains_key(&key)
+            && self.by_text.keys().filter(|(known, _)| *known == category).count() >= MOST_TEXTS
+        {
+            key.1 = MORE.into();
+        }
+        let objects = self.by_text.entry(key).or_default();
         let object = object.into();
         if objects.named.contains(&object) {
             return;
         }
-        match objects.named.len() < NAMED {
+        match objects.named.len() < MOST_NAMED {
             true => objects.named.push(object),
             false => objects.more += 1,
         }
     }
 
-    /// One line a note: `mesh 3 "rope", mesh 4 "wire" and 7 more: lines are not drawn`.
-    pub(super) fn into_lines(self) -> Vec<String> {
-        let line = |(text, objects): (String, Objects)| {
+    /// `mesh 3 "rope", mesh 4 "wire" and 7 more: lines are not drawn`, in order of category and text.
+    pub(super) fn into_list(self) -> Vec<Note> {
+        let note = |((category, text), objects): ((Category, String), Objects)| {
             let named = objects.named.join(", ");
-            match objects.more {
+            let text = match objects.more {
                 0 => format!("{named}: {text}"),
                 more => format!("{named} and {more} more: {text}"),
-            }
+            };
+            Note { category, text }
         };
-        self.objects_by_text.into_iter().map(line).collect()
+        self.by_text.into_iter().map(note).collect()
     }
 }
 
@@ -48,15 +68,32 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_same_note_is_said_once() {
+    fn objects_with_the_same_text_share_a_note() {
         let mut notes = Notes::default();
         for i in 0..5 {
-            notes.add(format!("mesh {i}"), "lines are not drawn");
+            notes.add(Category::Geometry, format!("mesh {i}"), "lines are not drawn");
         }
-        notes.add("mesh 0", "lines are not drawn");
+        notes.add(Category::Geometry, "mesh 0", "lines are not drawn");
+        notes.add(Category::Lights, "light 0", "left out");
+        let told: Vec<String> = notes.into_list().iter().map(Note::to_string).collect();
         assert_eq!(
-            notes.into_lines(),
-            ["mesh 0, mesh 1, mesh 2 and 2 more: lines are not drawn".to_string()]
+            told,
+            [
+                "lights: light 0: left out",
+                "geometry: mesh 0, mesh 1, mesh 2 and 2 more: lines are not drawn",
+            ]
         );
+    }
+
+    #[test]
+    fn a_file_cannot_make_notes_without_end() {
+        let mut notes = Notes::default();
+        for i in 0..100_000 {
+            notes.add(Category::Other, "file", format!("EXT_{i} is not read"));
+        }
+        notes.add(Category::Lights, "light 0", "left out");
+        let list = notes.into_list();
+        assert_eq!(list.len(), MOST_TEXTS + 2);
+        assert!(list.iter().any(|note| note.category == Category::Lights));
     }
 }

@@ -7,7 +7,7 @@
 //! is 0 for every scene that is near enough.
 
 use super::notes::Notes;
-use crate::scene::{LightKind, Pose, Scene};
+use crate::scene::{Category, LightKind, Pose, Scene};
 use glam::{DVec3, Vec3};
 
 /// The origin is a multiple of the power of two that follows on so many reaches: no scene is farther
@@ -41,6 +41,7 @@ pub(super) fn settle(scene: &mut Scene) {
     let DVec3 { x, y, z } = scene.origin;
     for path in small {
         notes.add(
+            Category::Geometry,
             path,
             format!(
                 "is small and far from most of the scene, which is calculated around ({x}, {y}, \
@@ -50,7 +51,7 @@ pub(super) fn settle(scene: &mut Scene) {
             ),
         );
     }
-    scene.notes.extend(notes.into_lines());
+    scene.notes.extend(notes.into_list());
 }
 
 /// All meshes, finite lights and cameras, in the space of the pose.

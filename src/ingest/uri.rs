@@ -1,6 +1,8 @@
 //! References to other files: only inside the scene's folder, or in the reference itself.
 
+use super::MOST_FILE_BYTES;
 use super::error::Fault;
+use crate::store::read_regular;
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -91,7 +93,7 @@ impl Folder {
 
     pub(super) fn read(&self, file: &Path, object: &str) -> Result<Vec<u8>, Fault> {
         self.files.lock().unwrap_or_else(PoisonError::into_inner).insert(file.to_path_buf());
-        fs::read(file).map_err(|error| {
+        read_regular(file, MOST_FILE_BYTES).map_err(|error| {
             let problem = format!("{} cannot be read: {error}", file.display());
             Fault::new(object, problem).remedy("check the file and its permissions")
         })

@@ -2,7 +2,7 @@
 
 use super::walk::{What, walk};
 use crate::light_tree::LightTree;
-use crate::page::Short;
+use crate::page::{Plain, Short};
 use std::fmt::{self, Display, Write};
 
 /// The clusters of a tree's first frame down to some depth, with their shares of the energy, their
@@ -64,8 +64,8 @@ impl Display for Label<'_> {
             match char {
                 '"' | '\\' => write!(f, "\\{char}")?,
                 '&' => f.write_str("&amp;")?,
-                char if char.is_control() => f.write_char('\u{fffd}')?,
-                char => f.write_char(char)?,
+                // The backslash of its spelling is escaped too.
+                char => write!(f, "{}", Plain(char).to_string().replace('\\', "\\\\"))?,
             }
         }
         Ok(())

@@ -27,5 +27,5 @@ pub use scene::{CameraReport, SceneReport};
 pub use shape::{Shape, shapes};
 
 /// The version of the reports as JSON: in it fields may be added, and none changes or goes. Units are
-/// candela, metres and degrees; shares are in `[0, 1]`.
-pub const VERSION: u32 = 1;
+/// candela, metres and degrees; shares are in `[0, 1]`. Version 2: notes have a category and a text.
+pub const VERSION: u32 = 2;

@@ -4,7 +4,7 @@ use super::VERSION;
 use super::report::FrameSpan;
 use crate::emitter::Emitters;
 use crate::pipeline;
-use crate::scene::{Camera, Projection, Requirements, Scene};
+use crate::scene::{Camera, Note, Projection, Requirements, Scene};
 use serde::Serialize;
 
 /// A scene.
@@ -42,8 +42,8 @@ pub struct SceneReport {
     pub changing: usize,
     /// The features that it switches on, with counts.
     pub requires: Requirements,
-    /// What the file holds and nothing here models.
-    pub notes: Vec<String>,
+    /// What was left out, mended or approximated, by category.
+    pub notes: Vec<Note>,
 }
 
 /// A camera.
@@ -94,7 +94,7 @@ impl SceneReport {
             emitters: emitters.len(),
             changing: emitters.changing_count(),
             requires: scene.requirements(),
-            notes: scene.notes.iter().map(ToString::to_string).collect(),
+            notes: scene.notes.clone(),
         }
     }
 

@@ -13,6 +13,7 @@
 use super::importance::{Cluster, Factors, Sight, factors};
 use super::viewer::{Receiver, Viewer};
 use crate::math::Similarity;
+use crate::math::angle::between;
 use glam::Vec3;
 use std::f32::consts::{FRAC_1_PI, PI, TAU};
 
@@ -74,7 +75,7 @@ impl Glossy {
     /// Lambertian surface lit from its zenith. It takes the place of the cosine in an importance.
     pub fn reflects_from(&self, direction: Vec3, half_angle_rad: f32) -> f32 {
         let (sin_u, cos_u) = half_angle_rad.min(0.5 * PI).sin_cos();
-        let theta = self.receiver.normal.angle_between(direction);
+        let theta = between(self.receiver.normal, direction);
         let cosine = (theta - half_angle_rad).max(0.0).cos().max(LEAST);
         self.reflected(&Sight { to: direction.to_array(), cosine, cos_u, sin_u }).0
     }

@@ -1,8 +1,9 @@
 //! Text that stays text, in content and in quoted attributes alike.
 
+use super::plain::{Plain, is_visible};
 use std::fmt::{self, Display, Write};
 
-/// Displays a text so that no part of it is taken for markup.
+/// Displays a text so that no part of it is taken for markup. What is not visible is spelled out.
 pub struct Escaped<'a>(pub &'a str);
 
 impl Display for Escaped<'_> {
@@ -14,9 +15,8 @@ impl Display for Escaped<'_> {
                 '>' => f.write_str("&gt;")?,
                 '"' => f.write_str("&quot;")?,
                 '\'' => f.write_str("&#39;")?,
-                // HTML allows no other controls.
-                char if char.is_control() && !"\t\n\r".contains(char) => {
-                    f.write_char('\u{fffd}')?
+                char if !is_visible(char) && !"\t\n\r".contains(char) => {
+                    write!(f, "{}", Plain(char))?
                 }
                 char => f.write_char(char)?,
             }

@@ -1,7 +1,7 @@
 //! The content of a scene's files.
 
 use crate::scene::Scene;
-use std::fs::File;
+use crate::store::open_regular;
 use std::io;
 
 /// BLAKE3 over the bytes of the file that a scene was read from and of all files that it refers
@@ -14,7 +14,7 @@ pub fn scene_fingerprint(scene: &Scene) -> io::Result<[u8; 32]> {
     for path in &scene.files {
         let name =
             |error: io::Error| io::Error::new(error.kind(), format!("{}: {error}", path.display()));
-        let mut file = File::open(path).map_err(name)?;
+        let mut file = open_regular(path).map_err(name)?;
         hasher.update(&file.metadata().map_err(name)?.len().to_le_bytes());
         hasher.update_reader(&mut file).map_err(name)?;
     }

@@ -10,6 +10,7 @@ use crate::scene::Scene;
 use crate::store::{self, Mmap, StoreError};
 use std::collections::BTreeMap;
 use std::fmt;
+use std::io::Read;
 use std::path::{Path, PathBuf};
 
 /// A tree over a mapped file.
@@ -61,6 +62,12 @@ pub enum TreeError {
         /// The file.
         path: PathBuf,
     },
+    /// A file that is no tree file is where one should be written.
+    #[error("{}: exists and is no tree file; choose another output, or remove it", path.display())]
+    InTheWay {
+        /// The file.
+        path: PathBuf,
+    },
     /// The scene has a light that no tree can hold.
     #[error(transparent)]
     Overflow(#[from] LightOverflow),
@@ -96,6 +103,25 @@ pub fn open_base(path: &Path) -> Result<OpenedTree, TreeError> {
         Ok(tree)
     } else {
         Err(TreeError::OtherAlgorithm { path: path.into() })
+    }
+}
+
+/// Checks that a tree file may be written to a path: nothing is there, or nothing but a tree file or
+/// an empty file.
+///
+/// # Errors
+/// If something else is there.
+pub fn check_output(path: &Path) -> Result<(), TreeError> {
+    let mut start = Vec::new();
+    let read = match path.try_exists() {
+        Ok(false) => return Ok(()),
+        _ => store::open_regular(path)
+            .and_then(|file| file.take(store::MAGIC.len() as u64).read_to_end(&mut start)),
+    };
+    match read {
+        Ok(_) if start.is_empty() || start == store::MAGIC => Ok(()),
+        Ok(_) => Err(TreeError::InTheWay { path: path.into() }),
+        Err(cause) => Err(TreeError::Io { path: path.into(), cause }),
     }
 }
 

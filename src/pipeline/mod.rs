@@ -15,6 +15,7 @@ mod fresh;
 mod look;
 pub mod option;
 mod rig;
+mod strict;
 mod survey;
 mod textures;
 mod view;
@@ -25,10 +26,11 @@ pub use content::scene_fingerprint;
 pub use forced::{NoLightThere, force_lights};
 pub use frames::frames_of;
 pub use fresh::{
-    OpenedTree, StaleTree, TreeError, check_agreement, check_fresh, is_tree_file, open_base,
-    open_tree,
+    OpenedTree, StaleTree, TreeError, check_agreement, check_fresh, check_output, is_tree_file,
+    open_base, open_tree,
 };
 pub use rig::carry_camera;
+pub use strict::{Strict, StrictError};
 pub use survey::{Group, PlacedLight, SharedBounds, Survey, survey};
 pub use textures::collect_emitters;
 pub use view::{ASPECT, Look, View, ViewError, look};

@@ -26,7 +26,8 @@ pub struct Survey {
     pub lights: Vec<LightSummary>,
     /// What emission textures give, by ascending fingerprint. The bounds above follow from it.
     pub textures: Vec<TextureMeans>,
-    /// Of all of the above, and of the algorithm that builds over it.
+    /// BLAKE3 over all that the trees depend on: the lights above, the frames, and the algorithm that
+    /// builds over them.
     pub fingerprint: [u8; 32],
 }
 

@@ -7,14 +7,13 @@
 //! attributes in a hash map and several would be written in a random order.
 
 use super::buffers::{Pixel, RenderBuffers};
-use crate::store::write_atomically;
+use crate::store::{open_regular, write_atomically};
 use exr::block::reader::Reader;
 use exr::image::write::WritableImage;
 use exr::image::{AnyChannel, AnyChannels, Encoding, FlatSamples, Image, Layer};
 use exr::meta::attribute::{AttributeValue, Text};
 use exr::meta::header::LayerAttributes;
 use exr::prelude::{SmallVec, f16};
-use std::fs::File;
 use std::io::{self, BufReader};
 use std::path::Path;
 
@@ -61,7 +60,8 @@ pub fn write_exr(
 /// The JSON text of a file that [`write_exr`] made, if the file is whole. `None` if it is not there,
 /// is no such file, or ends early. Reads the header and the last rows, not the picture.
 pub fn read_metadata(path: &Path) -> Option<String> {
-    let reader = Reader::read_from_buffered(BufReader::new(File::open(path).ok()?), false).ok()?;
+    let reader =
+        Reader::read_from_buffered(BufReader::new(open_regular(path).ok()?), false).ok()?;
     let header = reader.headers().first()?;
     let attribute = header.own_attributes.other.get(METADATA.as_bytes())?;
     let AttributeValue::Text(text) = attribute else { return None };

@@ -14,6 +14,7 @@
 //! | [`lights`](Scene::lights) | lights that are not meshes: points, spots, spheres, suns, domes |
 //! | [`medium`](Scene::medium) | the fog that fills it, or a box of it; one or none |
 //! | [`cameras`](Scene::cameras) | a view from a node |
+//! | [`notes`](Scene::notes) | what the file holds and the scene does not |
 //!
 //! Units: metres, seconds, radians; +Y is up. Emission is in the file's own photometric numbers
 //! (nits, candela, lux): radiance 1 in the file is 1 in the picture.
@@ -25,6 +26,7 @@ mod light;
 mod material;
 mod medium;
 mod mesh;
+mod note;
 mod pose;
 mod posing;
 mod requirements;
@@ -39,6 +41,7 @@ pub use light::{Light, LightKind, Shaping};
 pub use material::{AlphaMode, Material};
 pub use medium::{FogBox, Medium};
 pub use mesh::{Instance, Mesh};
+pub use note::{Category, Note};
 pub use pose::{Channel, Interpolation, Keys, Node, Pose, Trs};
 pub use posing::Posing;
 pub use requirements::Requirements;
@@ -77,8 +80,9 @@ pub struct Scene {
     pub origin: DVec3,
     /// How frame numbers map to seconds.
     pub timeline: Timeline,
-    /// What the file holds and this scene does not, in words for the user; each names its object.
-    pub notes: Vec<String>,
+    /// What was left out, mended or approximated on the way from the file, by category; each note
+    /// names its objects.
+    pub notes: Vec<Note>,
 }
 
 impl Scene {

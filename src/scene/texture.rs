@@ -34,7 +34,7 @@ pub enum Pixels {
 }
 
 /// How a coordinate outside [0, 1] is brought back.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 pub enum Wrap {
     /// Tiles.
     #[default]

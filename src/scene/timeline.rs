@@ -1,16 +1,16 @@
 //! Frame numbers and seconds, and when two times are the same.
-//!
-//! Files store key times in 32 bits: a key on frame 3 at 24 frames per second is 0.125 s, but one on
-//! frame 2 is a little more than 1/12 s, and a stepped value would come a frame late. So a key counts
-//! as *at* a frame's time if it is within one step of its 32-bit number, or within 1e-4 of a frame,
-//! which covers times that a file gives with six decimals. A step, not half of one: many programs
-//! multiply by a frame's duration that is rounded already. At any rate a key counts for no frame that
-//! is not the nearest.
 
 /// How frame numbers map to seconds on the file's animation clock.
 ///
 /// USD exports carry theirs (`startTimeCode`, `timeCodesPerSecond`); for any other file frame 1 is
 /// second 0 at 24 frames per second.
+///
+/// Files store key times in 32 bits. A key on the fourth frame is at 0.125 s exactly, but one on the
+/// third is stored a little after 1/12 s, and a stepped value would come a frame late. So a key counts
+/// as *at* a time if it is within one step of its 32-bit number, or within 1e-4 of a frame, which covers
+/// times that a file gives with six decimals. It is a step and not half of one, because many programs
+/// multiply by a frame's duration that is rounded already. A key never counts for a frame that is not
+/// the nearest.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Timeline {
     /// The frame that is second 0.
@@ -41,7 +41,7 @@ impl Timeline {
         if self.is_same(self.seconds_at(whole), time_s) { whole } else { frame }
     }
 
-    /// Whether a key is meant to be at a time; both in seconds. See the [module page](self).
+    /// Whether a key is meant to be at a time; both in seconds. [`Timeline`] says by what rule.
     pub fn is_same(&self, time_s: f64, key_s: f64) -> bool {
         let in_frames = |frames: f64| frames / self.frames_per_second;
         let step = key_s.abs() * f64::from(f32::EPSILON);

@@ -1,8 +1,8 @@
 //! Memory-mapped files: the one place with `unsafe`.
 #![allow(unsafe_code)]
 
+use super::open_regular;
 use memmap2::{Advice, Mmap};
-use std::fs::File;
 use std::io;
 use std::path::Path;
 
@@ -18,10 +18,7 @@ use std::path::Path;
 /// from here. No frame that is done is lost by it, for pictures are written whole or not at all; start the
 /// render again with `--resume`. Copy trees to a new name and `mv` them over the old one.
 pub fn map(path: &Path) -> io::Result<Mmap> {
-    let file = File::open(path)?;
-    if !file.metadata()?.is_file() {
-        return Err(io::Error::new(io::ErrorKind::InvalidInput, "not a regular file"));
-    }
+    let file = open_regular(path)?;
     // SAFETY: the mapping is undefined if another process truncates or overwrites the file while
     // we read. No tool of ours does (see above). All types viewed in the bytes are `Pod`, so that
     // foreign writes could at worst give wrong numbers, which sampling survives by construction.

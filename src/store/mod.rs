@@ -1,7 +1,8 @@
 //! Floor 1: bytes on disk, and nothing of what they mean.
 //!
 //! A [`Container`] is a header, a table of sections and the sections themselves, over mapped or owned
-//! bytes. [`map()`] maps a file, [`write_atomically`] writes one that is either whole or not there.
+//! bytes. [`map()`] maps a file, [`read_regular`] reads one, [`write_atomically`] writes one that is either whole
+//! or not there.
 //! What the sections of a tree file hold is `light_tree`'s affair.
 #![doc = include_str!("format.md")]
 
@@ -10,6 +11,7 @@ mod bytes;
 mod container;
 mod error;
 mod map;
+mod regular;
 mod rule;
 
 pub use atomic::{check_writable, write_atomically};
@@ -18,5 +20,6 @@ pub use container::{Container, ContainerWriter, MAGIC, Section, SectionId, VERSI
 pub use error::{RULES_OF_HEADER, RULES_OF_TABLE, StoreError};
 pub use map::map;
 pub use memmap2::Mmap;
+pub use regular::{open_regular, read_regular};
 pub(crate) use rule::rules;
 pub use rule::{Record, Rule, Violation};

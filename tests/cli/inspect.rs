@@ -35,7 +35,7 @@ fn json_of(shot: &Shot, arguments: &str) -> Value {
 fn the_numbers_of_a_tree_agree_with_each_other() {
     let shot = lamps(300);
     let report = json_of(&shot, "inspect shot.ltree --json --lights 3");
-    assert_eq!((&report["schema"], &report["version"]), (&json!("candelabra.tree"), &json!(1)));
+    assert_eq!((&report["schema"], &report["version"]), (&json!("candelabra.tree"), &json!(2)));
     assert_eq!((&report["lights"], &report["emitters"]), (&json!(300), &json!(300)));
     assert_eq!(report["bytes"], shot.read("shot.ltree").len());
     let sections = report["sections"].as_array().unwrap();

@@ -7,6 +7,8 @@ mod files;
 mod inspect;
 mod lies;
 mod lights;
+mod names;
+mod notes;
 mod pages;
 #[allow(dead_code)]
 #[path = "../fuzz/probe/tree.rs"]

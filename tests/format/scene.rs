@@ -204,7 +204,7 @@ fn means_are_taken_from_the_file() {
     }
     // And what could be, but is not, is not believed.
     let mut parts = Parts::of(owner.bytes.as_ref());
-    parts.set("MEAN", 8, 0.9f32.to_bits());
+    parts.set("MEAN", 4, 0.9f32.to_bits());
     let lie = open(parts.file());
     lie.verify().unwrap();
     assert!(owner.check(&lie, true).is_err());

@@ -33,7 +33,7 @@ fn a_box_of_fog_stands_at_its_node() {
     assert_eq!(scene.nodes[1].path, "/root/lamp");
     assert_eq!(scene.requirements().fog, 1);
     assert_eq!(scene.instances.len(), 1, "the node keeps its mesh");
-    assert_eq!(scene.notes, [] as [&str; 0]);
+    assert_eq!(scene.notes, []);
 }
 
 #[test]
@@ -65,7 +65,7 @@ fn a_second_fog_is_noted() {
     let scene = file.load().unwrap();
     assert_eq!(scene.medium.unwrap().scattering, Vec3::splat(0.5), "the scene's own comes first");
     assert_eq!(scene.notes.len(), 1);
-    assert!(scene.notes[0].contains("node 0 \"lamp\""), "{:?}", scene.notes);
+    assert!(scene.notes[0].text.contains("node 0 \"lamp\""), "{:?}", scene.notes);
 }
 
 #[test]
@@ -77,7 +77,7 @@ fn hidden_fog_is_noted() {
     file.json["scenes"][0]["nodes"] = json!([0, 1]);
     let scene = file.load().unwrap();
     assert_eq!(scene.medium, None);
-    assert!(scene.notes[0].contains("mist"), "{:?}", scene.notes);
+    assert!(scene.notes[0].text.contains("mist"), "{:?}", scene.notes);
 }
 
 #[test]

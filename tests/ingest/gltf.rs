@@ -1,13 +1,13 @@
 //! What glTF can say, compiled.
 
 use crate::files::{lamp, png};
-use candelabra::scene::Shaping;
 use candelabra::scene::{AlphaMode, Channel, Interpolation, LightKind, Pixels, Trs, Wrap};
+use candelabra::scene::{Note, Shaping};
 use glam::{DVec3, Vec2, Vec3, Vec4};
 use serde_json::json;
 use std::f32::consts::{FRAC_1_SQRT_2, FRAC_PI_2, FRAC_PI_4};
 
-const NO_NOTES: [&str; 0] = [];
+const NO_NOTES: [Note; 0] = [];
 
 #[test]
 fn a_binary_file_is_the_same() {
@@ -111,7 +111,7 @@ fn hidden_nodes_are_left_out_with_their_children() {
     file.json["scenes"][0]["nodes"] = json!([1]);
     let scene = file.load().unwrap();
     assert!(scene.instances.is_empty());
-    assert!(scene.notes[0].contains("node 0 \"lamp\""), "{:?}", scene.notes);
+    assert!(scene.notes[0].text.contains("node 0 \"lamp\""), "{:?}", scene.notes);
 }
 
 #[test]
@@ -169,7 +169,7 @@ fn strips_and_unindexed_triangles_are_triangles() {
     file.json["meshes"][0]["primitives"][0]["mode"] = json!(1);
     let scene = file.load().unwrap();
     assert!(scene.instances.is_empty());
-    assert!(scene.notes[0].contains("mesh 0 \"flame\""), "{:?}", scene.notes);
+    assert!(scene.notes[0].text.contains("mesh 0 \"flame\""), "{:?}", scene.notes);
 }
 
 #[test]
@@ -193,7 +193,8 @@ fn materials_are_compiled() {
     assert_eq!((material.metallic, material.roughness, material.ior), (0.25, 0.75, 1.33));
     assert_eq!((material.specular, material.specular_color), (0.5, Vec3::new(1.0, 0.5, 2.0)));
     assert!(material.double_sided && !material.emits());
-    assert_eq!(scene.notes, ["material 0: KHR_materials_clearcoat is not read"]);
+    let told: Vec<String> = scene.notes.iter().map(ToString::to_string).collect();
+    assert_eq!(told, ["materials: material 0: KHR_materials_clearcoat is not read"]);
 }
 
 #[test]
@@ -310,7 +311,7 @@ fn animations_become_channels() {
     assert_eq!((scales.interpolation, scales.values.len()), (Interpolation::Cubic, 6));
     assert_eq!(scene.pose_at(1.0).world(0).translation, Vec3::X.into());
     assert_eq!(scene.notes.len(), 1);
-    assert!(scene.notes[0].contains("/materials/0/emissiveFactor"), "{:?}", scene.notes);
+    assert!(scene.notes[0].text.contains("/materials/0/emissiveFactor"), "{:?}", scene.notes);
 }
 
 #[test]

@@ -6,6 +6,7 @@ mod files;
 mod fog;
 mod gltf;
 mod malformed;
+mod mended;
 mod obj;
 mod open_exr;
 #[path = "../fuzz/probe/scene.rs"]

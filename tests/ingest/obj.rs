@@ -2,7 +2,7 @@
 
 use crate::files;
 use candelabra::ingest::{IngestError, load};
-use candelabra::scene::{AlphaMode, Scene};
+use candelabra::scene::{AlphaMode, Category, Scene};
 use glam::{Vec2, Vec3};
 use std::path::Path;
 
@@ -35,22 +35,123 @@ fn objects_emit_by_their_material() {
     assert!(glow.emission_texture.is_some());
     assert_eq!(scene.meshes[0].uv_sets[0][0], Vec2::new(0.25, 0.75), "v points down");
     let wall = &scene.materials[scene.meshes[1].material.unwrap() as usize];
-    assert_eq!((wall.base_color, wall.specular, wall.ior), (Vec3::new(0.5, 0.6, 0.7), 0.5, 1.5));
+    assert_eq!((wall.base_color, wall.specular, wall.ior), (Vec3::new(0.25, 0.3, 0.35), 0.5, 1.5));
     assert!((wall.roughness - (2.0f32 / 12.0).powf(0.25)).abs() < 1e-6);
     assert_eq!(scene.meshes[1].triangles.len(), 2);
     assert_eq!(scene.notes.len(), 1);
-    assert!(scene.notes[0].contains("absent.png"), "{:?}", scene.notes);
+    assert!(scene.notes[0].text.contains("absent.png"), "{:?}", scene.notes);
 }
 
+/// What is not there may have been a light, so that notes about it are about lights.
 #[test]
 fn stale_references_are_noted() {
     let folder = tempfile::tempdir().unwrap();
-    for library in ["absent.mtl", "../outside.mtl", "C:\\models\\a.mtl", "/etc/passwd"] {
-        let obj = format!("mtllib {library}\nusemtl a\n{TRIANGLE}f 1 2 3\n");
+    for library in ["absent.mtl", "../outside.mtl", "C:\\models\\a.mtl", "/etc/passwd", "a b.mtl"] {
+        let obj = format!("mtllib {library}\nusemtl lamb\n{TRIANGLE}f 1 2 3\n");
         let scene = load_in(folder.path(), &obj).unwrap();
         assert_eq!(scene.meshes[0].material, None);
-        assert!(scene.notes[0].contains("material library"), "{library}: {:?}", scene.notes);
+        let [material, library_note] = &scene.notes[..] else { panic!("{:?}", scene.notes) };
+        assert!(material.text.contains("material \"lamb\""), "{material}");
+        assert!(
+            library_note.text.contains(&format!("material library {library:?}")),
+            "{library_note}"
+        );
+        assert!(scene.notes.iter().all(|note| note.category == Category::Lights));
     }
+    // What exporters write for none.
+    let scene = load_in(folder.path(), &format!("{TRIANGLE}usemtl None\nf 1 2 3\n")).unwrap();
+    assert_eq!(scene.notes, []);
+}
+
+/// The format parts libraries by spaces; programs write names that hold spaces.
+#[test]
+fn a_line_names_several_libraries_or_one_with_spaces() {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, material) in [("a.mtl", "a"), ("b.mtl", "b"), ("c d.mtl", "c"), ("e.mtl", "a")] {
+        let mtl = format!("newmtl {material}\nKe {} 1 1\n", name.len());
+        std::fs::write(folder.path().join(name), mtl).unwrap();
+    }
+    let load = |lines: &str| {
+        let uses = ["a", "b", "c"].map(|name| format!("usemtl {name}\nf 1 2 3\n")).concat();
+        let scene = load_in(folder.path(), &format!("{TRIANGLE}{lines}\n{uses}")).unwrap();
+        let known: Vec<(String, f32)> =
+            scene.materials.iter().map(|m| (m.name.clone(), m.emission_nits.x)).collect();
+        (known, scene.notes.len())
+    };
+    let all = [("a", 5.0), ("b", 5.0), ("c", 7.0)].map(|(name, red)| (name.to_string(), red));
+    for lines in [
+        "mtllib a.mtl b.mtl c d.mtl",
+        "mtllib c d.mtl b.mtl a.mtl",
+        "mtllib a.mtl\nmtllib\tb.mtl  \nmtllib \"c d.mtl\"",
+        "mtllib a.mtl \\\n b.mtl\nmtllib c d.mtl\nmtllib a.mtl",
+    ] {
+        assert_eq!(load(lines), (all.to_vec(), 0), "{lines}");
+    }
+    let (known, notes) = load("mtllib a.mtl absent.mtl e.mtl");
+    assert_eq!((known, notes), (all[..1].to_vec(), 4), "b and c; the library; a second time a");
+}
+
+/// A face is covered once, whatever corner comes first.
+#[test]
+fn concave_faces_have_their_area() {
+    let folder = tempfile::tempdir().unwrap();
+    // An L of 2.2 square metres.
+    let corners = [[0.0, 0.0], [2.0, 0.0], [2.0, 0.6], [1.0, 0.6], [1.0, 1.6], [0.0, 1.6]];
+    let area = 1.2 + 1.0;
+    for (turn, first) in [(false, 0), (false, 1), (true, 2), (true, 3), (false, 4), (true, 5)] {
+        let mut order: Vec<usize> = (0..6).map(|i| (i + first) % 6).collect();
+        if turn {
+            order.reverse();
+        }
+        let vertices = corners.map(|[x, y]| format!("v {x} {y} 3\n")).concat();
+        let face = order.iter().map(|i| format!(" {}", i + 1)).collect::<String>();
+        let scene = load_in(folder.path(), &format!("{vertices}f{face}\n")).unwrap();
+        let mesh = &scene.meshes[0];
+        let normals = mesh.triangles.iter().map(|t| {
+            let [a, b, c] = t.map(|corner| mesh.positions[corner as usize]);
+            0.5 * (b - a).cross(c - a)
+        });
+        let covered: f32 = normals.clone().map(Vec3::length).sum();
+        let facing = normals.sum::<Vec3>().z;
+        assert!((covered - area).abs() < 1e-5, "{order:?}: {covered}");
+        assert!((facing - if turn { -area } else { area }).abs() < 1e-5, "{order:?}: {facing}");
+        assert_eq!(scene.notes, []);
+    }
+    let bow = "v 0 0 0\nv 1 1 0\nv 1 0 0\nv 0 3 0\nf 1 2 3 4\n";
+    let scene = load_in(folder.path(), bow).unwrap();
+    assert!(scene.notes[0].text.contains("cross themselves"), "{:?}", scene.notes);
+}
+
+/// One line that cannot be read costs no more than itself.
+#[test]
+fn odd_lines_cost_nothing_else() {
+    let folder = tempfile::tempdir().unwrap();
+    let mtl = "Ke 9 9 9\nnewmtl glow\nillum x\nNs\nKs 1 2\nd -halo 0.5\nKe xyz 0.95047 1 1.08883\nmap_d\n\
+        newmtl\nnewmtl dim\nTr 0.25\nKe spectral lamp.rfl\nKE 1 1 1\n\
+        newmtl sky\nmap_Ke -mm 0 4 -s 2 2 2 glow.png\nnewmtl gone\nKe 3 3 3\nmap_Ke gone.png\n";
+    std::fs::write(folder.path().join("m.mtl"), mtl).unwrap();
+    std::fs::write(folder.path().join("glow.png"), files::png(1, 1, [255; 4])).unwrap();
+    let uses =
+        ["glow", "dim", "sky", "gone"].map(|name| format!("usemtl {name}\nf 1 2 3\n")).concat();
+    let obj =
+        format!("mtllib m.mtl\n{TRIANGLE}vt 1\nvn a\nl 1 2\np 1\nf 1 2\nf 1 2 9\nf x\n{uses}");
+    let scene = load_in(folder.path(), &obj).unwrap();
+    let [glow, dim, sky, gone] = &scene.materials[..] else { panic!("{:?}", scene.materials) };
+    assert!((glow.emission_nits - Vec3::ONE).abs().max_element() < 1e-4);
+    assert_eq!((glow.opacity, dim.opacity), (0.5, 0.75));
+    assert_eq!(dim.emission_nits, Vec3::ONE, "the last of several counts");
+    assert_eq!(sky.emission_nits, Vec3::splat(4.0));
+    assert!(sky.emission_texture.unwrap().transform.is_some());
+    assert_eq!(gone.emission_nits, Vec3::ZERO, "without its picture it would be too bright");
+    let of_light: Vec<&str> = scene
+        .notes
+        .iter()
+        .filter(|note| note.category == Category::Lights)
+        .map(|note| note.text.as_str())
+        .collect();
+    assert_eq!(of_light.len(), 2, "{of_light:?}");
+    assert!(of_light.iter().any(|text| text.contains("gone.png") && text.contains("left out")));
+    assert!(of_light.iter().any(|text| text.contains("texture coordinates")), "{of_light:?}");
 }
 
 #[test]
@@ -64,7 +165,7 @@ fn numbers_that_are_not_finite_are_left_out() {
     assert_eq!(mesh.triangles.len(), 1);
     assert!(mesh.positions.iter().all(|position| position.is_finite()));
     assert!(mesh.normals.iter().all(|normal| normal.is_normalized()));
-    assert!(scene.notes[0].contains("not finite"), "{:?}", scene.notes);
+    assert!(scene.notes[0].text.contains("not finite"), "{:?}", scene.notes);
 }
 
 #[test]

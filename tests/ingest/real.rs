@@ -111,7 +111,7 @@ fn animation_pointers_to_nodes_are_animation() {
     assert_eq!(scene.lights.len(), 4);
     assert!(scene.requirements().animated_nodes > 4);
     assert!(
-        scene.notes.iter().any(|note| note.contains("animation of light")),
+        scene.notes.iter().any(|note| note.text.contains("animation of light")),
         "{:?}",
         scene.notes
     );
@@ -141,7 +141,7 @@ fn obj_emission_is_read() {
     let Some(scene) = real("stochastic_lightcuts_cornell/cornell.obj") else { return };
     assert_eq!(emissive_triangles(&scene), 12_146);
     assert_eq!(scene.requirements().mesh_lights, 13);
-    assert_eq!(scene.notes, [] as [&str; 0]);
+    assert_eq!(scene.notes, []);
 }
 
 #[test]

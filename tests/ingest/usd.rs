@@ -53,7 +53,7 @@ fn a_stretched_sphere_stays_a_mesh() {
     for scene in [load(stretched), load(below_stretched), load(animated)] {
         assert!(scene.lights.is_empty());
         assert!(scene.instances[0].forced);
-        assert!(scene.notes[0].contains("sphere is stretched"), "{:?}", scene.notes);
+        assert!(scene.notes[0].text.contains("sphere is stretched"), "{:?}", scene.notes);
     }
 }
 
@@ -202,7 +202,12 @@ fn what_is_not_carried_is_noted() {
         file.json["scenes"][0]["nodes"] = json!([0, 1]);
     });
     assert_eq!(scene.notes.len(), 1, "{:?}", scene.notes);
-    assert!(scene.notes.iter().any(|note| note.contains("node 1") && note.contains("PortalLight")));
+    assert!(
+        scene
+            .notes
+            .iter()
+            .any(|note| note.text.contains("node 1") && note.text.contains("PortalLight"))
+    );
 }
 
 /// Values at 0 and 1 seconds.
@@ -263,7 +268,7 @@ fn every_kind_of_light_varies() {
     for scene in [&point, &sun, &dome, &sphere] {
         let pose = scene.pose_at(0.5);
         assert_eq!(pose.light_rgb(0), Some(Vec3::new(1.0, 2.0, 0.0)), "{:?}", scene.lights);
-        assert_eq!(scene.notes, [] as [&str; 0]);
+        assert_eq!(scene.notes, []);
     }
     // One node has one light: the values are not those of a mesh beside it.
     assert_eq!(point.instances.len(), 1);

@@ -198,6 +198,24 @@ fn a_mesh_light_on_its_own_has_a_tree_of_its_own_only_if_it_changes() {
     assert_eq!(leaves_of(true, false, few), [vec![], vec![1], vec![8; 3]]);
 }
 
+/// A scale that varies but is the same along all axes is a similarity in each frame.
+#[test]
+fn what_grows_evenly_keeps_its_tree() {
+    let mut stage = chandelier();
+    let hub = stage.scene.nodes.iter().position(|node| !node.channels.is_empty()).unwrap();
+    let grows = |scales: [f32; 3]| Channel::Scale(keys(scales.map(Vec3::splat)));
+    stage.scene.nodes[hub].channels.push(grows([1.0, 0.6, 0.3]));
+    let set = Set::of(&stage.scene, &FRAMES);
+    assert_eq!(leaves(&set.tree, TreeKind::Shared), [SIDES]);
+    let moving = SIMILAR.len() as u32;
+    assert_eq!(leaves(&set.tree, TreeKind::Frame), [moving + 1; FRAMES.len()]);
+    assert_frames(&set);
+    // One that shrinks to nothing has no space of its own then.
+    *stage.scene.nodes[hub].channels.last_mut().unwrap() = grows([1.0, 0.0, 1.0]);
+    let set = Set::of(&stage.scene, &FRAMES);
+    assert_eq!(leaves(&set.tree, TreeKind::Frame), [moving * SIDES + 1; FRAMES.len()]);
+}
+
 #[test]
 fn a_shape_that_changes_is_built_anew() {
     let mut stage = chandelier();

@@ -1,6 +1,6 @@
 //! The command line.
 
-use candelabra::pipeline::{ASPECT, View, option};
+use candelabra::pipeline::{ASPECT, Strict, View, option};
 use candelabra::render::frame_names::FrameNames;
 use candelabra::render::frames::Frames;
 use candelabra::render::{LightStrategy, RenderSettings, SplitBy};
@@ -78,6 +78,10 @@ pub struct Arguments {
     /// Do not prove that the tree file is sound before using it
     #[arg(long)]
     pub no_verify: bool,
+    /// Take notes about the scene for errors: all, or those of the categories given, such as
+    /// --strict=lights,cameras (lights, materials, geometry, cameras, animation, other)
+    #[arg(long, value_name = "CATEGORIES", num_args = 0..=1, require_equals = true, default_missing_value = Strict::EVERYTHING)]
+    pub strict: Option<Strict>,
 }
 
 /// How lights are picked.

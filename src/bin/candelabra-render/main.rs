@@ -7,6 +7,7 @@ mod shot;
 mod texture_bar;
 
 use arguments::Arguments;
+use candelabra::page::Plain;
 use candelabra::pipeline::{TreeError, ViewError};
 use candelabra::render::frame_names::FrameNamesError;
 use clap::Parser;
@@ -29,7 +30,7 @@ fn main() -> ExitCode {
             ExitCode::from(FAILED)
         }
         Err(error) => {
-            eprintln!("candelabra-render: {error:#}");
+            eprintln!("candelabra-render: {}", Plain(format_args!("{error:#}")));
             ExitCode::from(match error {
                 error if is_bad_tree(&error) => BAD_TREE,
                 error if is_usage(&error) => USAGE,

@@ -1,5 +1,6 @@
 //! A bar with the time left, on a terminal.
 
+use candelabra::page::Plain;
 use candelabra::render::Progress;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::io::Write;
@@ -33,7 +34,7 @@ impl Bar {
     /// frame.
     pub fn line(&self, text: &str) {
         self.0.suspend(|| {
-            let _ = writeln!(std::io::stdout(), "{text}");
+            let _ = writeln!(std::io::stdout(), "{}", Plain(text));
         });
     }
 

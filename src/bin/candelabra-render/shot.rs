@@ -6,6 +6,7 @@ use crate::texture_bar::TextureBar;
 use anyhow::{Context, Result, bail};
 use candelabra::emitter::Emitters;
 use candelabra::light_tree::{ALGORITHM_VERSION, LightTree};
+use candelabra::page::Plain;
 use candelabra::pipeline::{self, OpenedTree};
 use candelabra::render::exr::{ExrOptions, read_metadata, write_exr};
 use candelabra::render::frames::Frames;
@@ -29,13 +30,16 @@ pub fn render(arguments: &Arguments) -> Result<usize> {
         check_names(arguments, frames)?;
     }
     let mut scene = pipeline::load_scene(&arguments.scene)?;
+    for note in &scene.notes {
+        eprintln!("note: {}", Plain(note));
+    }
+    if let Some(strict) = &arguments.strict {
+        strict.check(&scene)?;
+    }
     pipeline::force_lights(&mut scene, &arguments.force_light)
         .with_context(|| arguments.scene.display().to_string())?;
     if let Some(fog) = &arguments.fog {
         scene.medium = Some(fog.clone());
-    }
-    for note in &scene.notes {
-        eprintln!("note: {note}");
     }
     let frames = match &arguments.frames {
         Some(frames) => frames.clone(),
@@ -47,7 +51,7 @@ pub fn render(arguments: &Arguments) -> Result<usize> {
     };
     let look = pipeline::look(&mut scene, &arguments.view, arguments.aspect())?;
     if let Some(note) = &look.note {
-        eprintln!("note: {note}");
+        eprintln!("note: {}", Plain(note));
     }
     let camera = look.camera;
     refuse_to_overwrite(arguments, &scene, &frames)?;

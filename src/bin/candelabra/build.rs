@@ -4,8 +4,8 @@ use crate::texture_bar::TextureBar;
 use anyhow::{Context, Result, bail};
 use candelabra::emitter::Emitters;
 use candelabra::light_tree::LightTree;
-use candelabra::page::counted;
-use candelabra::pipeline::{self, OpenedTree, Rebuilt, Standing, Survey, TreeError};
+use candelabra::page::{Lines, Plain, counted};
+use candelabra::pipeline::{self, OpenedTree, Rebuilt, Standing, Strict, Survey, TreeError};
 use candelabra::render::frames::Frames;
 use candelabra::scene::Scene;
 use candelabra::store::{AlignedBytes, check_writable, write_atomically};
@@ -39,6 +39,10 @@ pub struct Arguments {
     /// Build even if the output is up to date, and all of it
     #[arg(long, conflicts_with = "base")]
     force: bool,
+    /// Take notes about the scene for errors: all, or those of the categories given, such as
+    /// --strict=lights,cameras (lights, materials, geometry, cameras, animation, other)
+    #[arg(long, value_name = "CATEGORIES", num_args = 0..=1, require_equals = true, default_missing_value = Strict::EVERYTHING)]
+    strict: Option<Strict>,
 }
 
 pub fn run(arguments: &Arguments) -> Result<()> {
@@ -47,11 +51,12 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         rayon::ThreadPoolBuilder::new().num_threads(threads.into()).build_global()?;
     }
     let output = arguments.output.clone().unwrap_or(arguments.scene.with_extension("ltree"));
+    pipeline::check_output(&output)?;
     // An output that is there may be up to date, and need no writing.
     if !output.is_file() {
         check_writable(&output)?;
     }
-    let mut out = std::io::stdout().lock();
+    let mut out = Lines(std::io::stdout().lock());
 
     let load = || {
         let (loaded, loading) = timed(|| pipeline::load_scene(&arguments.scene));
@@ -64,11 +69,14 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     };
     let (loaded, (before, base)) = rayon::join(load, open);
     let (mut scene, loading) = loaded?;
+    for note in &scene.notes {
+        eprintln!("note: {}", Plain(note));
+    }
+    if let Some(strict) = &arguments.strict {
+        strict.check(&scene)?;
+    }
     let named = || arguments.scene.display().to_string();
     pipeline::force_lights(&mut scene, &arguments.force_light).with_context(named)?;
-    for note in &scene.notes {
-        eprintln!("note: {note}");
-    }
     let real = |path: &Path| path.canonicalize().ok();
     if scene.files.iter().any(|input| real(input).is_some() && real(input) == real(&output)) {
         bail!("{}: is the scene's own file; choose another output", output.display());
@@ -99,8 +107,8 @@ pub fn run(arguments: &Arguments) -> Result<()> {
             return Ok(());
         }
         Some((Standing::Contradicts(what), before)) => {
-            let path = before.path.display();
-            eprintln!("note: {path}: contradicts the scene: {what}; built from the scene alone");
+            let what = format!("{}: contradicts the scene: {what}", before.path.display());
+            eprintln!("note: {}; built from the scene alone", Plain(what));
             None
         }
         Some((Standing::OutOfDate, before)) => Some(before),
@@ -111,7 +119,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         None => before,
         Some(Ok(base)) => Some(base),
         Some(Err(error)) => {
-            eprintln!("note: not built upon {error}");
+            eprintln!("note: not built upon {}", Plain(error));
             None
         }
     };
@@ -139,7 +147,8 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     if is_partial {
         return Ok(());
     }
-    let with = with_file(arguments, &scene, &output)?;
+    // Somebody else may have written another tree there since.
+    let Ok(with) = with_file(arguments, &scene, &output) else { return Ok(()) };
     let without = match survey.frames.len() {
         0 | 1 => collecting + surveying + building,
         _ => collecting + without_file(&scene, &emitters, frames[0])?,
@@ -160,7 +169,7 @@ fn collect(scene: &Scene) -> Emitters {
 }
 
 /// What a process spends that renders with the file, between reading the scene and its first frame.
-fn with_file(arguments: &Arguments, scene: &Scene, output: &Path) -> Result<Duration> {
+fn with_file(arguments: &Arguments, scene: &Scene, output: &Path) -> Result<Duration, TreeError> {
     let (checked, with) = timed(|| {
         let tree = pipeline::open_tree(output, true)?;
         let emitters = pipeline::collect_emitters(scene, Some(&tree), &|_, _| {});

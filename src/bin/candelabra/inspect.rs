@@ -5,8 +5,8 @@ use anyhow::{Context, Result};
 use candelabra::emitter::Emitters;
 use candelabra::inspect::{self, SceneReport, TreeReport};
 use candelabra::light_tree::LightTree;
-use candelabra::page::{Short, counted};
-use candelabra::pipeline;
+use candelabra::page::{Lines, Plain, Short, counted, plain_json};
+use candelabra::pipeline::{self, Strict};
 use clap::Args;
 use serde::Serialize;
 use std::io::Write;
@@ -31,6 +31,10 @@ pub struct Arguments {
     /// Write a page with pictures of the lights and the clusters; a scene's tree is built for it
     #[arg(long, value_name = "FILE", group = "form")]
     html: Option<PathBuf>,
+    /// Take notes about a scene for errors: all, or those of the categories given, such as
+    /// --strict=lights,cameras (lights, materials, geometry, cameras, animation, other)
+    #[arg(long, value_name = "CATEGORIES", num_args = 0..=1, require_equals = true, default_missing_value = Strict::EVERYTHING)]
+    strict: Option<Strict>,
 }
 
 pub fn run(arguments: &Arguments) -> Result<()> {
@@ -47,13 +51,17 @@ pub fn run(arguments: &Arguments) -> Result<()> {
 
 fn show_scene(arguments: &Arguments) -> Result<()> {
     let scene = pipeline::load_scene(&arguments.file)?;
+    if let Some(Err(refused)) = arguments.strict.as_ref().map(|strict| strict.check(&scene)) {
+        scene.notes.iter().for_each(|note| eprintln!("note: {}", Plain(note)));
+        return Err(refused.into());
+    }
     let emitters = Emitters::collect(&scene);
     let report = SceneReport::of(&scene, &emitters);
     if arguments.json {
         return print_json(&report);
     }
     if !arguments.dot && arguments.html.is_none() {
-        return print_scene(&mut std::io::stdout().lock(), &report);
+        return print_scene(&mut Lines(std::io::stdout().lock()), &report);
     }
     let survey = pipeline::survey(&scene, &emitters, &pipeline::frames_of(&scene))
         .with_context(|| arguments.file.display().to_string())?;
@@ -66,7 +74,7 @@ fn show_tree<D: AsRef<[u8]>>(
     tree: &LightTree<D>,
     scene: Option<&SceneReport>,
 ) -> Result<()> {
-    let mut out = std::io::stdout().lock();
+    let mut out = Lines(std::io::stdout().lock());
     let file = arguments.file.display().to_string();
     let report = TreeReport::of(tree, &file, arguments.lights);
     if arguments.json {
@@ -81,7 +89,8 @@ fn show_tree<D: AsRef<[u8]>>(
 }
 
 fn print_json(report: &impl Serialize) -> Result<()> {
-    writeln!(std::io::stdout().lock(), "{}", serde_json::to_string_pretty(report)?)?;
+    let json = plain_json(&serde_json::to_string_pretty(report)?);
+    writeln!(std::io::stdout().lock(), "{json}")?;
     Ok(())
 }
 

@@ -10,6 +10,7 @@ mod shot;
 mod texture_bar;
 mod verify;
 
+use candelabra::page::Plain;
 use candelabra::pipeline::ViewError;
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
@@ -57,7 +58,7 @@ fn main() -> ExitCode {
         // A reader that has seen enough (`| head`) is no failure.
         Err(error) if is_closed_pipe(&error) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("candelabra: {error:#}");
+            eprintln!("candelabra: {}", Plain(format_args!("{error:#}")));
             match command {
                 Command::Diff(_) => diff::TROUBLE.into(),
                 _ if error.downcast_ref().is_some_and(ViewError::is_usage) => USAGE.into(),

@@ -10,7 +10,7 @@ use clap::Args;
 use std::path::PathBuf;
 
 #[derive(Args)]
-#[group(id = "shot")]
+#[group(skip)]
 pub struct Arguments {
     /// The scene: .gltf, .glb or .obj
     scene: PathBuf,

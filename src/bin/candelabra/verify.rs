@@ -3,7 +3,7 @@
 use crate::texture_bar::TextureBar;
 use anyhow::{Context, Result};
 use candelabra::emitter::Emitters;
-use candelabra::page::counted;
+use candelabra::page::{Lines, Plain, counted};
 use candelabra::pipeline::{self, OpenedTree, TreeError};
 use candelabra::scene::Scene;
 use candelabra::store::StoreError;
@@ -56,13 +56,13 @@ impl Owner {
 
 /// Checks each file and says of each what it is, whatever the others are. The worst decides the code.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
-    let mut out = std::io::stdout().lock();
+    let mut out = Lines(std::io::stdout().lock());
     let owner = match &arguments.scene {
         None => None,
         Some(path) => match Owner::load(path, &arguments.force_light) {
             Ok(owner) => Some(owner),
             Err(error) => {
-                eprintln!("candelabra: {error:#}");
+                eprintln!("candelabra: {}", Plain(format_args!("{error:#}")));
                 return Ok(ExitCode::from(TROUBLE));
             }
         },
@@ -95,7 +95,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
                 UNSOUND
             }
             Err(error) => {
-                eprintln!("candelabra: {error}");
+                eprintln!("candelabra: {}", Plain(error));
                 TROUBLE
             }
         });

@@ -3,7 +3,7 @@
 mod change;
 
 use super::{Diff, FolderDiff, Outcome, PickingChange, ProbePlaces, Verb};
-use crate::page::{Count, Short, Triple, counted};
+use crate::page::{Count, Plain, Short, Triple, counted};
 use std::fmt;
 
 pub(super) use change::details;
@@ -23,7 +23,7 @@ const WIDEST_PATH: usize = 48;
 impl fmt::Display for Text<'_, Diff> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Diff { before, after, totals, .. } = self.of;
-        write!(f, "{} -> {}: ", before.file, after.file)?;
+        write!(f, "{} -> {}: ", Plain(&before.file), Plain(&after.file))?;
         if self.of.is_same() {
             let emitters = counted(totals.after.emitters, "emitter");
             return writeln!(f, "the same {} of {emitters}", counted(totals.after.lights, "light"));
@@ -74,7 +74,7 @@ impl Text<'_, Diff> {
             };
             let (share, path) = (percent(change.share), change.path());
             let line = format!("  {share:>6} %  {verb:<7}  {path:<width$}  {}", details(change));
-            writeln!(f, "{}", line.trim_end())?;
+            writeln!(f, "{}", Plain(line.trim_end()))?;
         }
         match changes.len() - listed.len() {
             0 => Ok(()),
@@ -87,7 +87,7 @@ impl fmt::Display for Text<'_, FolderDiff> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let FolderDiff { before, after, shots } = self.of;
         let differ = shots.iter().filter(|shot| !matches!(shot.outcome, Outcome::Same)).count();
-        write!(f, "{before} -> {after}: ")?;
+        write!(f, "{} -> {}: ", Plain(before), Plain(after))?;
         match differ {
             0 => writeln!(f, "the same {}", counted(shots.len(), "shot"))?,
             _ => writeln!(f, "{} of {} differ", Count(differ), counted(shots.len(), "shot"))?,
@@ -95,9 +95,9 @@ impl fmt::Display for Text<'_, FolderDiff> {
         for shot in shots {
             match &shot.outcome {
                 Outcome::Same => {}
-                Outcome::Added => writeln!(f, "added    {}", shot.name)?,
-                Outcome::Removed => writeln!(f, "removed  {}", shot.name)?,
-                Outcome::Trouble { message } => writeln!(f, "trouble  {message}")?,
+                Outcome::Added => writeln!(f, "added    {}", Plain(&shot.name))?,
+                Outcome::Removed => writeln!(f, "removed  {}", Plain(&shot.name))?,
+                Outcome::Trouble { message } => writeln!(f, "trouble  {}", Plain(message))?,
                 Outcome::Dirtied { diff } => {
                     write!(f, "dirtied  {}", Text { of: diff.as_ref(), most: self.most })?;
                 }

@@ -1,19 +1,18 @@
 //! Accessors: arrays of vectors in the buffers.
 //!
-//! Opening one proves that every byte it speaks of is there, so reading cannot fail.
+//! Opening one proves that every byte it speaks of is there, so that reading cannot fail. One that cannot be
+//! opened fails nobody but those who use it. Bytes are read one by one: alignment does not matter, nor do
+//! the bounds that an accessor declares.
 
 use super::buffers::Buffers;
 use super::document::{Document, label};
+use crate::ingest::budget::Budget;
 use crate::ingest::error::Fault;
 use gltf::json::accessor::sparse::Sparse;
 use gltf::json::accessor::{ComponentType, GenericComponentType, IndexComponentType, Type};
 use gltf::json::buffer::View;
 use gltf::json::validation::{Checked, USize64};
 use gltf::json::{Accessor as Row, Index};
-
-/// More elements than this do not exist without bytes behind them, in all sparse accessors of a
-/// file together.
-const MOST_UNBACKED: usize = 1 << 26;
 
 /// An array whose every element is inside its buffer.
 pub(super) struct Accessor<'a> {
@@ -44,8 +43,6 @@ struct Layout {
     /// Components of a column; a vector is one column.
     rows: usize,
     component_bytes: usize,
-    /// From one column to the next: matrices align theirs to four bytes.
-    column_bytes: usize,
     /// From one element to the next, if they are packed.
     step: usize,
     /// What belongs to an element: without the padding after its last column.
@@ -62,9 +59,10 @@ impl Layout {
         };
         let component_bytes = component.size();
         let tight = rows * component_bytes;
+        // Matrices align their columns to four bytes.
         let column_bytes = if columns == 1 { tight } else { tight.next_multiple_of(4) };
         let step = columns * column_bytes;
-        Layout { rows, component_bytes, column_bytes, step, bytes: step - column_bytes + tight }
+        Layout { rows, component_bytes, step, bytes: step - column_bytes + tight }
     }
 }
 
@@ -92,59 +90,62 @@ fn largest(component: ComponentType) -> f64 {
     }
 }
 
-impl<'a> Accessor<'a> {
-    /// Opens every accessor of the document.
-    pub(super) fn open_all(
+/// Every accessor of a document: opened, or what is wrong with it.
+pub(super) struct Accessors<'a> {
+    rows: Vec<Result<Accessor<'a>, String>>,
+}
+
+impl<'a> Accessors<'a> {
+    pub(super) fn open(
         document: &Document,
         buffers: &'a Buffers<'a>,
-    ) -> Result<Vec<Accessor<'a>>, Fault> {
-        let mut unbacked = 0usize;
-        let open = |(i, row): (usize, &Row)| {
-            let object = label("accessor", i, row.name.as_deref());
-            let accessor = Accessor::open(document, buffers, row, &object)?;
-            if accessor.base.is_none() && accessor.sparse.is_some() {
-                unbacked = unbacked.saturating_add(accessor.count);
-            }
-            match unbacked <= MOST_UNBACKED {
-                true => Ok(accessor),
-                false => Err(Fault::new(object, "speaks of too many elements without data")),
-            }
-        };
-        document.accessors.iter().enumerate().map(open).collect()
+        budget: &mut Budget,
+    ) -> Result<Accessors<'a>, Fault> {
+        let mut rows = Vec::with_capacity(document.accessors.len());
+        for (i, row) in document.accessors.iter().enumerate() {
+            let sparse = row.sparse.as_ref().map_or(0, |sparse| sparse.count.0);
+            // No index without a byte behind it.
+            let sparse = sparse.min(buffers.size());
+            budget.take(4 * sparse, || label("accessor", i, row.name.as_deref()))?;
+            rows.push(Accessor::open(document, buffers, row));
+        }
+        Ok(Accessors { rows })
     }
 
+    /// The accessor of a number, else what is wrong with it.
+    pub(super) fn get(&self, index: Index<Row>) -> Result<&Accessor<'a>, String> {
+        match self.rows.get(index.value()) {
+            Some(Ok(accessor)) => Ok(accessor),
+            Some(Err(problem)) => Err(format!("accessor {index}: {problem}")),
+            None => Err(format!("accessor {index} is not in the file")),
+        }
+    }
+}
+
+impl<'a> Accessor<'a> {
     fn open(
         document: &Document,
         buffers: &'a Buffers<'a>,
         row: &Row,
-        object: &str,
-    ) -> Result<Accessor<'a>, Fault> {
-        let fault = |problem: String| Fault::new(object, problem);
+    ) -> Result<Accessor<'a>, String> {
         let (Checked::Valid(GenericComponentType(component)), Checked::Valid(shape)) =
             (row.component_type, row.type_)
         else {
-            return Err(fault("has an unknown type".into()));
+            return Err("has an unknown type".into());
         };
         let layout = Layout::of(component, shape);
-        if row.normalized && matches!(component, ComponentType::F32 | ComponentType::U32) {
-            return Err(fault("is normalised, which its component type cannot be".into()));
-        }
         // Indices are 32 bits wide, so no more elements could be spoken of.
         let count = u32::try_from(row.count.0)
             .ok()
             .filter(|&count| count > 0)
-            .ok_or_else(|| fault(format!("has {} elements", row.count.0)))?
-            as usize;
-        let base = match row.buffer_view {
-            Some(view) => Some(Strided::open(document, buffers, row, view, count, layout, object)?),
-            None if row.byte_offset.is_some() => {
-                return Err(fault("has an offset into no buffer view".into()));
-            }
-            None => None,
-        };
-        let open = |sparse| Overrides::open(document, buffers, sparse, count, layout, object);
+            .ok_or_else(|| format!("has {} elements", row.count.0))? as usize;
+        let open = |view| Strided::open(document, buffers, row, view, count, layout);
+        let base = row.buffer_view.map(open).transpose()?;
+        let open = |sparse| Overrides::open(document, buffers, sparse, count, layout);
         let sparse = row.sparse.as_ref().map(open).transpose()?;
-        let normalized = row.normalized;
+        // Neither floats nor integers of 32 bits can be normalised.
+        let is_small = !matches!(component, ComponentType::F32 | ComponentType::U32);
+        let normalized = row.normalized && is_small;
         Ok(Accessor { component, shape, layout, count, normalized, base, sparse })
     }
 
@@ -155,11 +156,6 @@ impl<'a> Accessor<'a> {
     /// Whether there is data at all; without, every element is zero.
     pub(super) fn has_data(&self) -> bool {
         self.base.is_some() || self.sparse.is_some()
-    }
-
-    /// Whether the elements are interleaved with others, as only vertex attributes may be.
-    pub(super) fn is_interleaved(&self) -> bool {
-        self.base.as_ref().is_some_and(|base| base.stride != self.layout.step)
     }
 
     /// The bytes of an element; none are zeros.
@@ -173,26 +169,8 @@ impl<'a> Accessor<'a> {
         self.base.as_ref().map_or(&[], |base| &base.bytes[i * base.stride..][..size])
     }
 
-    /// Calls back with every component of every element as it is stored, and its number.
-    pub(super) fn for_each_raw(&self, mut visit: impl FnMut(usize, f64)) {
-        let Layout { rows, component_bytes, column_bytes, .. } = self.layout;
-        let offsets: Vec<usize> = (0..self.shape.multiplicity())
-            .map(|i| i / rows * column_bytes + i % rows * component_bytes)
-            .collect();
-        for element in (0..self.count).map(|i| self.element(i)) {
-            for (i, &offset) in offsets.iter().enumerate() {
-                visit(i, raw(self.component, element.get(offset..).unwrap_or(&[])));
-            }
-        }
-    }
-
-    /// All elements as vectors of `N` components, normalised integers as what they mean.
-    /// Components that the accessor does not have are `missing`.
-    pub(super) fn vectors<const N: usize>(&self, missing: f32) -> Vec<[f32; N]> {
-        (0..self.count).map(|i| self.vector(i, missing)).collect()
-    }
-
-    /// One element of [`vectors`](Self::vectors).
+    /// An element as a vector of `N` components, normalised integers as what they mean. Components that the
+    /// accessor does not have are `missing`.
     pub(super) fn vector<const N: usize>(&self, i: usize, missing: f32) -> [f32; N] {
         let (step, rows) = (self.layout.component_bytes, self.layout.rows.min(N));
         let mut vector = [missing; N];
@@ -227,34 +205,22 @@ impl<'a> Strided<'a> {
         view: Index<View>,
         count: usize,
         layout: Layout,
-        object: &str,
-    ) -> Result<Strided<'a>, Fault> {
-        let fault = |problem: String| Fault::new(object, problem);
-        let bytes = buffers.view(document, view, object)?;
-        let view_row = &document.buffer_views[view.value()];
+    ) -> Result<Strided<'a>, String> {
+        let bytes = buffers.view(document, view)?;
         let size = layout.bytes;
-        let stride = view_row.byte_stride.map_or(layout.step, |stride| stride.0);
+        let stride = document.buffer_views[view.value()].byte_stride;
+        let stride = stride.map_or(layout.step, |stride| stride.0);
         if stride < size {
-            return Err(fault(format!("its elements of {size} bytes overlap: stride {stride}")));
-        }
-        let offset = row.byte_offset.unwrap_or_default().0;
-        let view_offset = view_row.byte_offset.unwrap_or_default().0;
-        let alignment = layout.component_bytes as u64;
-        let aligned = offset.is_multiple_of(alignment)
-            && offset.wrapping_add(view_offset).is_multiple_of(alignment)
-            && (stride as u64).is_multiple_of(alignment)
-            && (layout.step == layout.column_bytes || offset.is_multiple_of(4));
-        if !aligned {
-            return Err(fault("is not aligned to its component type".into()));
+            return Err(format!("its elements of {size} bytes overlap: stride {stride}"));
         }
         let extent = stride.checked_mul(count - 1).and_then(|bytes| bytes.checked_add(size));
-        let start = usize::try_from(offset).ok();
+        let start = usize::try_from(row.byte_offset.unwrap_or_default().0).ok();
         let inside = start
             .zip(extent)
             .and_then(|(start, extent)| bytes.get(start..start.checked_add(extent)?));
         let bytes = inside.ok_or_else(|| {
-            let room = view_row.byte_length.0;
-            fault(format!("its {count} elements do not fit the {room} bytes of buffer view {view}"))
+            let room = bytes.len();
+            format!("its {count} elements do not fit the {room} bytes of buffer view {view}")
         })?;
         Ok(Strided { bytes, stride })
     }
@@ -267,25 +233,20 @@ impl<'a> Overrides<'a> {
         sparse: &Sparse,
         count: usize,
         layout: Layout,
-        object: &str,
-    ) -> Result<Overrides<'a>, Fault> {
-        let fault = |problem: &str| Fault::new(object, format!("its sparse {problem}"));
+    ) -> Result<Overrides<'a>, String> {
         let overridden = usize::try_from(sparse.count.0)
             .ok()
             .filter(|&overridden| 0 < overridden && overridden <= count)
-            .ok_or_else(|| fault("count is out of range"))?;
+            .ok_or("its sparse count is out of range")?;
         let packed = |view: Index<View>, offset: USize64, size: usize| {
-            let bytes = buffers.view(document, view, object)?;
-            if document.buffer_views[view.value()].byte_stride.is_some() {
-                return Err(fault("data has a stride"));
-            }
+            let bytes = buffers.view(document, view)?;
             let start = usize::try_from(offset.0).ok();
             let end = start.zip(overridden.checked_mul(size)).and_then(|(a, b)| a.checked_add(b));
             let inside = start.zip(end).and_then(|(start, end)| bytes.get(start..end));
-            inside.ok_or_else(|| fault("data does not fit its buffer view"))
+            inside.ok_or_else(|| "its sparse data does not fit its buffer view".to_string())
         };
         let Checked::Valid(IndexComponentType(kind)) = sparse.indices.component_type else {
-            return Err(fault("indices have a component type that indices cannot have"));
+            return Err("its sparse indices have a type that indices cannot have".into());
         };
         let coded = packed(sparse.indices.buffer_view, sparse.indices.byte_offset, kind.size())?;
         let indices: Vec<u32> =
@@ -293,7 +254,7 @@ impl<'a> Overrides<'a> {
         if !indices.is_sorted_by(|a, b| a < b)
             || indices.last().is_some_and(|&i| i as usize >= count)
         {
-            return Err(fault("indices do not ascend or are out of range"));
+            return Err("its sparse indices do not ascend or are out of range".into());
         }
         let values = sparse.values.byte_offset;
         let values = packed(sparse.values.buffer_view, values, layout.step)?;

@@ -6,12 +6,14 @@
 use super::document::{UsdCamera, reals};
 use super::{Output, Source};
 use crate::ingest::notes::Notes;
-use crate::scene::{Camera, Projection};
+use crate::scene::{Camera, Category, Projection};
 use gltf::json::{Camera as Row, Index, Node};
 use std::f32::consts::PI;
 
 /// The field of view that is taken where the file's is none, degrees.
 const DEFAULT_YFOV_DEG: f32 = 45.0;
+
+const CAMERAS: Category = Category::Cameras;
 
 /// Adds the camera of a node.
 pub(super) fn compile(
@@ -24,32 +26,45 @@ pub(super) fn compile(
 ) {
     let document = source.document;
     let notes = &mut output.notes;
+    let Some(lens) = document.get(camera) else {
+        notes.add(CAMERAS, object, "its camera is not in the file; left out");
+        return;
+    };
     let is_sound = |aspect: &f32| *aspect > 0.0 && aspect.is_finite();
-    let mut compiled = if let Some(lens) = &document.cameras[camera.value()].perspective {
+    let mut compiled = if let Some(lens) = &lens.perspective {
         let aspect = lens.aspect_ratio.filter(is_sound);
         if aspect != lens.aspect_ratio {
-            notes.add(object, "its camera's aspect ratio is not positive; left out");
+            notes.add(CAMERAS, object, "its camera's aspect ratio is not positive; left out");
         }
         Camera { aspect, ..Camera::perspective(node, field_of_view(lens.yfov, object, notes)) }
-    } else if let Some(seen) = document.beside.magnifications[camera.value()] {
+    } else if let Some(seen) = document.beside.magnifications.get(camera.value()).copied().flatten()
+    {
         // glTF advises against a negative magnification, which would mirror the picture.
         let (xmag, ymag) = (seen.xmag.f32().abs(), seen.ymag.f32().abs());
         let height_m = 2.0 * ymag;
         if !(is_sound(&height_m) && xmag > 0.0) {
-            notes.add(object, "its orthographic camera sees no width or no height; left out");
+            notes.add(
+                CAMERAS,
+                object,
+                "its orthographic camera sees no width or no height; left out",
+            );
             return;
         }
         let aspect = Some(xmag / ymag).filter(is_sound);
         Camera { aspect, ..Camera::orthographic(node, height_m) }
     } else {
-        notes.add(object, "its camera has no projection; left out");
+        notes.add(CAMERAS, object, "its camera has no projection; left out");
         return;
     };
     match UsdCamera::of(&row.extras, object) {
         Ok(Some(usd)) => apply(&usd, &mut compiled, object, notes),
         Ok(None) => {}
         Err(fault) => {
-            notes.add(object, format!("extras.usdCamera is not read: {}", fault.into_problem()));
+            notes.add(
+                CAMERAS,
+                object,
+                format!("extras.usdCamera is not read: {}", fault.into_problem()),
+            );
         }
     }
     output.scene.cameras.push(compiled);
@@ -66,7 +81,7 @@ fn field_of_view(yfov: f32, object: &str, notes: &mut Notes) -> f32 {
         "its camera's vertical field of view, {yfov} radians, is not between 0 and pi; \
          {DEFAULT_YFOV_DEG} degrees are taken"
     );
-    notes.add(object, problem);
+    notes.add(CAMERAS, object, problem);
     DEFAULT_YFOV_DEG.to_radians()
 }
 
@@ -77,30 +92,42 @@ fn apply(usd: &UsdCamera, camera: &mut Camera, object: &str, notes: &mut Notes) 
     camera.film_offset = reals(usd.film_offset);
     // A lens that is focused nowhere blurs everything: USD means a pinhole.
     if f_stop > 0.0 && matches!(camera.projection, Projection::Orthographic { .. }) {
-        notes.add(object, "its camera is orthographic and has no lens; its f-stop is left out");
+        notes.add(
+            CAMERAS,
+            object,
+            "its camera is orthographic and has no lens; its f-stop is left out",
+        );
     } else if f_stop > 0.0 && focus_distance > 0.0 {
         let radius = focal_length / (2.0 * f_stop);
         if radius >= 0.0 && radius.is_finite() {
             camera.lens_radius_m = radius;
             camera.focus_distance_m = focus_distance;
         } else {
-            notes.add(object, "its camera's lens has no possible radius; taken for a pinhole");
+            notes.add(
+                CAMERAS,
+                object,
+                "its camera's lens has no possible radius; taken for a pinhole",
+            );
         }
     } else if f_stop < 0.0 || focus_distance < 0.0 {
-        notes.add(object, "its camera's f-stop or focus is negative; taken for a pinhole");
+        notes.add(CAMERAS, object, "its camera's f-stop or focus is negative; taken for a pinhole");
     }
     if let Some(scale) = usd.exposure_scale.map(|scale| scale.f32()) {
         if scale >= 0.0 {
             camera.exposure_scale = scale;
         } else {
-            notes.add(object, "its camera's exposure scale is negative; left out");
+            notes.add(CAMERAS, object, "its camera's exposure scale is negative; left out");
         }
     }
     if let Some([near, far]) = usd.clipping_range_m.map(reals) {
         if far > near.max(0.0) {
             camera.clip_m = [near.max(0.0), far];
         } else {
-            notes.add(object, "its camera's clipping planes leave nothing between them; left out");
+            notes.add(
+                CAMERAS,
+                object,
+                "its camera's clipping planes leave nothing between them; left out",
+            );
         }
     }
 }

@@ -1,10 +1,11 @@
 //! The bytes of a `.gltf` or `.glb` file: where its JSON is, and its binary chunk.
 //!
-//! Crate `gltf`'s `Glb` finds them too, but overflows on a length below 12, reads beyond the length
-//! that the header says, refuses unknown chunks, which are to be skipped, and does not look at what
-//! follows the second. Who checks all that has found the parts.
+//! Crate `gltf`'s `Glb` finds them too, but it overflows on a length below 12, reads beyond the length
+//! that the header says, and refuses unknown chunks, which should be skipped.
 
 use crate::ingest::error::Fault;
+use crate::ingest::notes::Notes;
+use crate::scene::Category;
 use std::ops::Range;
 
 const MAGIC: &[u8] = b"glTF";
@@ -22,13 +23,20 @@ pub(super) struct Container {
 
 impl Container {
     /// Finds the parts. A file without GLB's magic is all JSON.
-    pub(super) fn parse(bytes: Vec<u8>, must_be_glb: bool) -> Result<Container, Fault> {
+    pub(super) fn parse(
+        bytes: Vec<u8>,
+        must_be_glb: bool,
+        notes: &mut Notes,
+    ) -> Result<Container, Fault> {
         if bytes.starts_with(MAGIC) {
-            return Container::parse_glb(bytes);
+            return Container::parse_glb(bytes, notes);
         }
         if must_be_glb {
-            return Err(Fault::new("header", "does not start with the bytes glTF")
-                .remedy("the file is not a GLB or is damaged; fetch or export it again"));
+            if bytes.trim_ascii_start().first() != Some(&b'{') {
+                return Err(Fault::new("header", "does not start with the bytes glTF")
+                    .remedy("the file is not a GLB or is damaged; fetch or export it again"));
+            }
+            notes.add(Category::Other, "file", "is called .glb but holds JSON; read as .gltf");
         }
         let json = 0..bytes.len();
         Ok(Container { bytes, json, binary: None })
@@ -50,7 +58,7 @@ impl Container {
         self.bytes.len()
     }
 
-    fn parse_glb(bytes: Vec<u8>) -> Result<Container, Fault> {
+    fn parse_glb(bytes: Vec<u8>, notes: &mut Notes) -> Result<Container, Fault> {
         let damaged = |object: &str, problem: String| {
             Err(Fault::new(object, problem).remedy("the file is damaged; fetch or export it again"))
         };
@@ -61,43 +69,60 @@ impl Container {
             return Err(Fault::new("header", format!("GLB version {version} is not supported"))
                 .remedy("export glTF 2.0"));
         }
-        let length = length as usize;
-        if length > bytes.len() {
-            let problem = format!("says {length} bytes, but the file has {}", bytes.len());
-            return damaged("header", problem);
+        let mut note = |object: &str, text: &str| notes.add(Category::Other, object, text);
+        let mut end = length as usize;
+        if end > bytes.len() || end < HEADER_BYTES + CHUNK_HEADER_BYTES {
+            note("header", "says another length than the file has; the chunks are read to its end");
+            end = bytes.len();
         }
         let (mut json, mut binary) = (None, None);
         let (mut at, mut number) = (HEADER_BYTES, 0);
-        while at < length {
+        while at < end {
             let object = format!("chunk {number}");
             let start = at + CHUNK_HEADER_BYTES;
-            if start > length {
-                return damaged(&object, "its header ends too early".into());
+            let header = word(&bytes[..end], at).zip(word(&bytes[..end], at + 4));
+            let Some((size, kind)) = header else {
+                note(&object, "its header ends too early; left out");
+                break;
+            };
+            let room = end - start;
+            let size = size as usize;
+            if size > room {
+                // Whether anything is missing that is used is found out by what uses it.
+                if kind != BIN {
+                    return damaged(&object, format!("says {size} bytes, but {room} are left"));
+                }
+                note(&object, "says more bytes than are left");
             }
-            // The header is inside the file, so both words are.
-            let size = word(&bytes, at).unwrap_or(0) as usize;
-            let kind = word(&bytes, at + 4).unwrap_or(0);
-            if size > length - start {
-                let room = length - start;
-                return damaged(&object, format!("says {size} bytes, but {room} are left"));
-            }
+            let part = start..start + size.min(room);
+            at = next_chunk(&bytes[..end], &part);
             if !size.is_multiple_of(4) {
-                return damaged(&object, format!("its length {size} is not a multiple of 4"));
+                note(&object, "its length is not a multiple of 4");
             }
-            match (kind, number) {
-                (JSON, 0) => json = Some(start..start + size),
-                (BIN, 1) => binary = Some(start..start + size),
-                (JSON | BIN, _) => return damaged(&object, "repeated or out of order".into()),
-                (_, 0) => return damaged(&object, "the first chunk is not JSON".into()),
+            match kind {
+                JSON if json.is_none() => json = Some(part),
+                BIN if binary.is_none() => binary = Some(part),
+                JSON | BIN => note(&object, "repeats what an earlier chunk is for; left out"),
                 _ => {}
             }
-            (at, number) = (start + size, number + 1);
+            number += 1;
         }
         match json {
             Some(json) => Ok(Container { bytes, json, binary }),
             None => damaged("header", "there is no JSON chunk".into()),
         }
     }
+}
+
+/// Where the chunk after one begins. Chunks are padded to four bytes, and their lengths should say so; some
+/// writers leave the padding out of the length, others leave it out.
+fn next_chunk(bytes: &[u8], part: &Range<usize>) -> usize {
+    let padded = part.end.next_multiple_of(4);
+    let is_header = |at: usize| {
+        let fits = word(bytes, at).is_some_and(|size| size as usize <= bytes.len() - at);
+        fits && matches!(word(bytes, at + 4), Some(JSON | BIN))
+    };
+    if padded == part.end || is_header(part.end) { part.end } else { padded }
 }
 
 /// The little-endian word at an offset.
@@ -122,42 +147,64 @@ mod tests {
         bytes
     }
 
+    /// The parts, and how many notes there are.
+    fn parse(bytes: Vec<u8>) -> Result<(Container, usize), Fault> {
+        let mut notes = Notes::default();
+        let file = Container::parse(bytes, true, &mut notes)?;
+        Ok((file, notes.into_list().len()))
+    }
+
     #[test]
     fn chunks_are_found() {
-        let file = Container::parse(glb(&[(JSON, b"{}  "), (BIN, b"1234")]), true).unwrap();
+        let (file, notes) = parse(glb(&[(JSON, b"{}  "), (BIN, b"1234")])).unwrap();
         assert_eq!((file.json(), file.binary()), (&b"{}  "[..], Some(&b"1234"[..])));
-        let file = Container::parse(glb(&[(JSON, b"{}  "), (7, b""), (9, b"abcd")]), true).unwrap();
-        assert_eq!(file.binary(), None);
+        assert_eq!(notes, 0);
+        let (file, notes) = parse(glb(&[(JSON, b"{}  "), (7, b""), (9, b"abcd")])).unwrap();
+        assert_eq!((file.binary(), notes), (None, 0));
     }
 
     #[test]
-    fn lying_lengths_are_refused() {
+    fn lengths_without_their_padding_are_taken() {
+        // The padding is there, but not in the length; then it is not there at all.
+        let mut padded = glb(&[(JSON, b"{}  "), (BIN, b"1234")]);
+        padded[12] = 2;
+        for bytes in [padded, glb(&[(JSON, b"{}"), (BIN, b"1234")])] {
+            let (file, notes) = parse(bytes).unwrap();
+            assert_eq!((file.json(), file.binary()), (&b"{}"[..], Some(&b"1234"[..])));
+            assert_eq!(notes, 1);
+        }
+    }
+
+    #[test]
+    fn lying_lengths_do_no_harm() {
         let good = glb(&[(JSON, b"{}  "), (BIN, b"1234")]);
-        for cut in 4..good.len() {
-            assert!(Container::parse(good[..cut].to_vec(), true).is_err(), "cut at {cut}");
+        for cut in 0..good.len() {
+            // Whole JSON is all that there must be.
+            assert_eq!(parse(good[..cut].to_vec()).is_ok(), cut >= 24, "cut at {cut}");
         }
         for at in [8, 12, 24] {
-            for lie in [u32::MAX, 5, 1 << 31] {
+            for lie in [u32::MAX, 0, 1, 5, 11, 12, 19, 1 << 31] {
                 let mut bad = good.clone();
                 bad[at..at + 4].copy_from_slice(&lie.to_le_bytes());
-                assert!(Container::parse(bad, true).is_err(), "{lie} at {at}");
+                assert!(parse(bad).map_or(true, |(_, notes)| notes > 0), "{lie} at {at}");
             }
         }
-        let with_more = [good, b"more".to_vec()].concat();
-        assert!(Container::parse(with_more, true).is_ok(), "bytes after the end are no chunk");
+        let (_, notes) = parse([good, b"more".to_vec()].concat()).unwrap();
+        assert_eq!(notes, 0, "bytes after the end are no chunk");
     }
 
     #[test]
-    fn chunks_out_of_order_are_refused() {
-        for chunks in [
-            &[(BIN, &b"1234"[..])][..],
-            &[(BIN, b"1234"), (JSON, b"{}  ")],
-            &[(JSON, b"{}  "), (JSON, b"{}  ")],
-            &[(JSON, b"{}  "), (BIN, b"1234"), (BIN, b"1234")],
-            &[(JSON, b"{}  "), (9, b""), (BIN, b"1234")],
-            &[],
+    fn the_first_chunk_of_a_kind_counts_wherever_it_is() {
+        for (chunks, notes) in [
+            (&[(BIN, &b"1234"[..]), (JSON, b"{}  ")][..], 0),
+            (&[(JSON, b"{}  "), (JSON, b"[]  "), (BIN, b"1234")], 1),
+            (&[(JSON, b"{}  "), (BIN, b"1234"), (BIN, b"5678")], 1),
+            (&[(JSON, b"{}  "), (9, b""), (BIN, b"1234")], 0),
         ] {
-            assert!(Container::parse(glb(chunks), true).is_err());
+            let (file, told) = parse(glb(chunks)).unwrap();
+            assert_eq!((file.json(), file.binary()), (&b"{}  "[..], Some(&b"1234"[..])));
+            assert_eq!(told, notes);
         }
+        assert!(parse(glb(&[(BIN, b"1234")])).is_err() && parse(glb(&[])).is_err());
     }
 }

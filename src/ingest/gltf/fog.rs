@@ -4,7 +4,7 @@ use super::Output;
 use super::document::{UsdFog, label, reals};
 use crate::ingest::error::Fault;
 use crate::math::color::Rgb;
-use crate::scene::{FogBox, Medium};
+use crate::scene::{Category, FogBox, Medium};
 use glam::Vec3;
 use gltf::json::Extras;
 use gltf::json::Scene as Row;
@@ -41,7 +41,11 @@ fn add(output: &mut Output, medium: Medium, object: &str) {
     }
     match output.scene.medium {
         None => output.scene.medium = Some(medium),
-        Some(_) => output.notes.add(object, "only the first fog of a scene is read; left out"),
+        Some(_) => output.notes.add(
+            Category::Other,
+            object,
+            "only the first fog of a scene is read; left out",
+        ),
     }
 }
 

@@ -1,12 +1,13 @@
 //! Mesh primitives, compiled to triangle meshes when the first node uses them.
 
 use super::accessors::Accessor;
+use super::attributes::Attributes;
 use super::document::{label, morph_targets};
 use super::materials::{Materials, uv_sets};
 use super::{Output, Source};
 use crate::ingest::error::Fault;
 use crate::ingest::normals;
-use crate::scene::Mesh;
+use crate::scene::{Category, Mesh};
 use glam::{Vec2, Vec3, Vec4};
 use gltf::json::mesh::{Mode, Primitive, Semantic};
 use gltf::json::validation::Checked;
@@ -72,14 +73,19 @@ impl Meshes {
         source: &Source,
         output: &mut Output,
         number: Index<Row>,
-    ) -> Result<Option<u32>, Fault> {
+    ) -> Option<u32> {
+        let row = &source.document.meshes[number.value()];
+        let object = label("mesh", number.value(), row.name.as_deref());
+        let material = row.primitives.first()?.material?;
+        let is_shared = row.primitives.iter().all(|p| p.material == Some(material));
+        is_shared.then(|| self.materials.index(source, output, material, &object))?
+    }
+
+    /// What notes about a mesh are about: its light, if any of it may emit.
+    pub(super) fn category(&self, source: &Source, number: Index<Row>) -> Category {
         let primitives = &source.document.meshes[number.value()].primitives;
-        match primitives[0].material {
-            Some(material) if primitives.iter().all(|p| p.material == Some(material)) => {
-                self.materials.index(source, output, material).map(Some)
-            }
-            _ => Ok(None),
-        }
+        let may_emit = primitives.iter().any(|p| category(source, p) == Category::Lights);
+        if may_emit { Category::Lights } else { Category::Geometry }
     }
 
     fn compile(
@@ -89,47 +95,66 @@ impl Meshes {
         primitive: &Primitive,
         object: &str,
     ) -> Result<Option<Mesh>, Fault> {
-        let attribute = |semantic: Semantic| {
-            let index = primitive.attributes.get(&Checked::Valid(semantic))?;
-            Some(&source.accessors[index.value()])
-        };
-        let Some(positions) = attribute(Semantic::Positions) else {
-            output.notes.add(object, "has no positions; not drawn");
-            return Ok(None);
-        };
+        let category = category(source, primitive);
         let Checked::Valid(mode @ (Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan)) =
             primitive.mode
         else {
-            output.notes.add(object, "is made of points or lines; not drawn");
+            output.notes.add(category, object, "is not made of triangles; not drawn");
             return Ok(None);
         };
+        let attributes = Attributes { source, primitive };
+        let arrays = || -> Result<_, String> {
+            let positions = attributes.get(Semantic::Positions)?.ok_or("has no positions")?;
+            Ok((positions, attributes.indices()?))
+        };
+        let (positions, indices) = match arrays() {
+            Ok(arrays) => arrays,
+            Err(problem) => {
+                output.notes.add(category, object, format!("{problem}; not drawn"));
+                return Ok(None);
+            }
+        };
         if morph_targets(primitive) > 0 {
-            output.notes.add(object, "morph targets are not read; drawn in its rest shape");
+            let text = "morph targets are not read; drawn in its rest shape";
+            output.notes.add(Category::Animation, object, text);
         }
-        if attribute(Semantic::Joints(0)).is_some() {
-            output.notes.add(object, "skins are not read; drawn in its rest pose");
+        if primitive.attributes.contains_key(&Checked::Valid(Semantic::Joints(0))) {
+            let text = "skins are not read; drawn in its rest pose";
+            output.notes.add(Category::Animation, object, text);
         }
         let extensions = primitive.extensions.as_ref();
         if extensions.is_some_and(|e| e.others.contains_key("KHR_materials_variants")) {
-            output.notes.add(object, "material variants are not read; drawn with the default");
+            let text = "material variants are not read; drawn with the default";
+            output.notes.add(Category::Materials, object, text);
         }
-        let indices = primitive.indices.map(|index| &source.accessors[index.value()]);
         let corners = indices.map_or(positions.count, |indices| indices.count);
-        let triangle_bytes = 12 * corners as u64;
-        output.budget.take(triangle_bytes, || object.to_string())?;
+        // Strips and fans have a triangle for every corner, lists for every third.
+        let most = if mode == Mode::Triangles { corners / 3 } else { corners };
+        output.budget.take(12 * most as u64, || object.to_string())?;
         if mode == Mode::Triangles && !corners.is_multiple_of(3) {
-            output.notes.add(object, "its last triangle lacks corners; not drawn");
+            output.notes.add(category, object, "its last triangle lacks corners; not drawn");
         }
         let corner = |i: usize| indices.map_or(i as u32, |indices| indices.index(i));
         let mut triangles = triangles(mode, corners, corner);
+        let all = triangles.len();
+        let is_good = |&corner: &u32| {
+            let place: Option<[f32; 3]> = ((corner as usize) < positions.count)
+                .then(|| positions.vector(corner as usize, 0.0));
+            place.is_some_and(|place| Vec3::from_array(place).is_finite())
+        };
+        triangles.retain(|triangle| triangle.iter().all(is_good));
+        if triangles.len() < all {
+            let text = "has triangles whose corners are not there or not finite; they are left out";
+            output.notes.add(category, object, text);
+        }
         if triangles.is_empty() {
-            output.notes.add(object, "has no triangles; not drawn");
+            output.notes.add(category, object, "has no triangles; not drawn");
             return Ok(None);
         }
         let vertices = Vertices::of(&mut triangles, positions.count);
 
         let material = primitive.material;
-        let material = material.map(|m| self.materials.index(source, output, m)).transpose()?;
+        let material = material.and_then(|m| self.materials.index(source, output, m, object));
         let look = material.map(|m| output.scene.materials[m as usize].clone()).unwrap_or_default();
         let wants_tangents = look.normal_texture.is_some();
         let mut sets: Vec<u32> = uv_sets(&look).collect();
@@ -139,40 +164,80 @@ impl Meshes {
         let vertex_bytes = 12 + 12 + 16 + 16 + 8 * sets.len() as u64;
         output.budget.take(vertex_bytes * vertices.count as u64, || object.to_string())?;
 
+        // Of vertices that no triangle uses some may not be finite.
+        let finite = |place: [f32; 3]| match Vec3::from_array(place) {
+            place if place.is_finite() => place,
+            _ => Vec3::ZERO,
+        };
         let mut mesh = Mesh {
-            positions: vertices.read(positions, 0.0, Vec3::from_array),
+            positions: vertices.read(positions, 0.0, finite),
             triangles,
             material,
             ..Mesh::default()
         };
-        if let Some(accessor) = attribute(Semantic::Normals) {
-            mesh.normals = vertices.read(accessor, 0.0, Vec3::from_array);
+        if !attributes.bounds_hold(&mesh.positions) {
+            let text =
+                "its positions are outside the min and max that they declare, which are not used";
+            output.notes.add(Category::Geometry, object, text);
+        }
+        let attribute = |semantic: Semantic, output: &mut Output| {
+            let found = attributes.beside(semantic, positions.count);
+            found.unwrap_or_else(|problem| {
+                output.notes.add(Category::Geometry, object, format!("{problem}; left out"));
+                None
+            })
+        };
+        if let Some(accessor) = attribute(Semantic::Normals, output) {
+            mesh.normals = vertices.read(accessor, 0.0, finite);
             normals::make_unit(&mut mesh);
         }
-        if let Some(accessor) = attribute(Semantic::Tangents).filter(|_| wants_tangents) {
+        if wants_tangents && let Some(accessor) = attribute(Semantic::Tangents, output) {
             mesh.tangents = vertices.read(accessor, 1.0, unit_tangent);
             // A mesh with tangents of no length has none that mean anything.
             if mesh.tangents.iter().any(|tangent| !tangent.is_finite()) {
-                output
-                    .notes
-                    .add(object, "has tangents without a direction; derived from its texture set");
+                let text = "has tangents without a direction; derived from its texture set";
+                output.notes.add(Category::Geometry, object, text);
                 mesh.tangents.clear();
             }
         }
-        if let Some(accessor) = attribute(Semantic::Colors(0)) {
-            mesh.colors =
-                vertices.read(accessor, 1.0, |c| Vec4::from(c).clamp(Vec4::ZERO, Vec4::ONE));
+        if let Some(accessor) = attribute(Semantic::Colors(0), output) {
+            mesh.colors = vertices.read(accessor, 1.0, |color| {
+                let color = Vec4::from(color).clamp(Vec4::ZERO, Vec4::ONE);
+                if color.is_nan() { Vec4::ONE } else { color }
+            });
         }
         for set in sets {
-            match attribute(Semantic::TexCoords(set)).filter(|_| set < MOST_UV_SETS) {
-                Some(accessor) => {
-                    mesh.uv_sets.resize_with(mesh.uv_sets.len().max(set as usize + 1), Vec::new);
-                    mesh.uv_sets[set as usize] = vertices.read(accessor, 0.0, Vec2::from_array);
+            let accessor = match set {
+                0..MOST_UV_SETS => attribute(Semantic::TexCoords(set), output),
+                _ => None,
+            };
+            let set = (set as usize).min(MOST_UV_SETS as usize - 1);
+            mesh.uv_sets.resize_with(mesh.uv_sets.len().max(set + 1), Vec::new);
+            mesh.uv_sets[set] = match accessor {
+                Some(accessor) => vertices.read(accessor, 0.0, |uv| {
+                    let uv = Vec2::from_array(uv);
+                    if uv.is_finite() { uv } else { Vec2::ZERO }
+                }),
+                None => {
+                    let text = format!(
+                        "has no TEXCOORD_{set} for its textures; it has the colour of their corner (0, 0)"
+                    );
+                    output.notes.add(category, object, text);
+                    vec![Vec2::ZERO; vertices.count]
                 }
-                None => output.notes.add(object, format!("has no TEXCOORD_{set} for its textures")),
-            }
+            };
         }
         Ok(Some(mesh))
+    }
+}
+
+/// What notes about a primitive are about: its light, if it may emit.
+fn category(source: &Source, primitive: &Primitive) -> Category {
+    let material = primitive.material.map(|material| source.document.get(material));
+    let emits = |material: &gltf::json::Material| material.emissive_factor.0 != [0.0; 3];
+    match material {
+        Some(material) if material.is_none_or(emits) => Category::Lights,
+        _ => Category::Geometry,
     }
 }
 

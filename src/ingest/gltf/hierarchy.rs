@@ -6,12 +6,19 @@ use super::lights::{self, Placed};
 use super::{Output, Source, animation, cameras, fog, instancing};
 use crate::ingest::error::Fault;
 use crate::ingest::paths::{PrimPaths, component};
-use crate::scene::{Channel, Instance, Light, Node, Trs};
+use crate::scene::{Category, Channel, Instance, Light, Node, Trs};
 use glam::{DAffine3, DMat4, DQuat, DVec3};
 use gltf::json::{Index, Mesh, Node as Row};
+use std::mem;
 
 /// How far a scale may be from uniform for a sphere to stay a sphere.
 const UNIFORM_TOLERANCE: f64 = 1e-4;
+
+/// How far the length of a rotation's quaternion may be from one without a note.
+const QUATERNION_TOLERANCE: f64 = 0.01;
+
+/// How far the last row of a matrix may be from (0, 0, 0, 1) without a note.
+const AFFINE_TOLERANCE: f64 = 1e-6;
 
 /// A node of the file that is to be compiled.
 struct Open {
@@ -24,6 +31,8 @@ struct Open {
 struct Walk<'a> {
     source: &'a Source<'a>,
     channels: Vec<Vec<Channel>>,
+    /// For each node of the file where it was placed first.
+    placed: Vec<Option<u32>>,
     meshes: Meshes,
     paths: PrimPaths,
     /// For each node of the scene, whether neither it nor an ancestor ever scales unevenly.
@@ -35,14 +44,18 @@ pub(super) fn compile(source: &Source, output: &mut Output) -> Result<(), Fault>
     let mut walk = Walk {
         source,
         channels: animation::compile(source, output)?,
+        placed: vec![None; source.document.nodes.len()],
         meshes: Meshes::new(source),
         paths: PrimPaths::default(),
         uniform: Vec::new(),
     };
     // A stack, so that no depth of the hierarchy is a depth of calls.
-    let roots = roots(source, output)?;
+    if let Some((number, scene)) = source.document.default_scene() {
+        fog::of_scene(output, number, scene)?;
+    }
     let open = |row: usize, parent, visible| Open { row, parent, visible };
-    let mut stack: Vec<Open> = roots.into_iter().rev().map(|row| open(row, None, true)).collect();
+    let roots = source.forest.roots.iter().rev();
+    let mut stack: Vec<Open> = roots.map(|&row| open(row, None, true)).collect();
     while let Some(Open { row: number, parent, visible }) = stack.pop() {
         let row = &source.document.nodes[number];
         let visible = visible && !source.document.beside.hidden.contains(&number);
@@ -54,35 +67,13 @@ pub(super) fn compile(source: &Source, output: &mut Output) -> Result<(), Fault>
             || source.document.light_at(number).is_some()
             || UsdFog::of(&row.extras, &object)?.is_some()
         {
-            output.notes.add(object, "is hidden (KHR_node_visibility); left out");
+            // The file says that it is not to be seen: nothing is lost.
+            output.notes.add(Category::Other, object, "is hidden (KHR_node_visibility); left out");
         }
-        let children = row.children.iter().flatten().rev();
-        stack.extend(children.map(|child| open(child.value(), Some(node), visible)));
+        let children = source.forest.children(number).iter().rev();
+        stack.extend(children.map(|&child| open(child, Some(node), visible)));
     }
     Ok(())
-}
-
-/// The roots of the default scene, whose fog it adds; else of the first, else all.
-fn roots(source: &Source, output: &mut Output) -> Result<Vec<usize>, Fault> {
-    let document = source.document;
-    let default = document.scene.map_or(0, |scene| scene.value());
-    match document.scenes.get(default) {
-        Some(scene) => {
-            fog::of_scene(output, default, scene)?;
-            if document.scenes.len() > 1 {
-                let object = format!("scene {default}");
-                output.notes.add(object, "only this one of the file's scenes is read");
-            }
-            Ok(scene.nodes.iter().map(Index::value).collect())
-        }
-        None => {
-            let mut is_root = vec![true; document.nodes.len()];
-            for child in document.nodes.iter().flat_map(|node| node.children.iter().flatten()) {
-                is_root[child.value()] = false;
-            }
-            Ok((0..is_root.len()).filter(|&i| is_root[i]).collect())
-        }
-    }
 }
 
 impl Walk<'_> {
@@ -102,16 +93,23 @@ impl Walk<'_> {
                 format!("{above}/{}", component(name, || format!("node_{number}")))
             }
         };
-        let channels = std::mem::take(&mut self.channels[number]);
-        self.push(
-            output,
-            Node {
-                path,
-                parent,
-                local: local(&self.source.document.beside.transforms[number]),
-                channels,
-            },
-        )
+        let object = || label("node", number, row.name.as_deref());
+        let channels = match self.placed[number] {
+            None => mem::take(&mut self.channels[number]),
+            // Below another parent it moves alike.
+            Some(first) => {
+                let channels = &output.scene.nodes[first as usize].channels;
+                let keys = channels.iter().map(animation::byte_length).sum();
+                output.budget.take(keys, object)?;
+                channels.clone()
+            }
+        };
+        let local = local(&self.source.document.beside.transforms[number], |text| {
+            output.notes.add(Category::Geometry, object(), text);
+        });
+        let node = self.push(output, Node { path, parent, local, channels })?;
+        self.placed[number].get_or_insert(node);
+        Ok(node)
     }
 
     fn push(&mut self, output: &mut Output, mut node: Node) -> Result<u32, Fault> {
@@ -146,22 +144,37 @@ impl Walk<'_> {
         output.scene.lights.extend(light);
         let shaping = lights::shaping(lux.as_ref(), object)?;
         let forced = lux.as_ref().is_some_and(|lux| lux.force);
-        let instances = self.source.document.beside.instances.get(&number);
+        let document = self.source.document;
+        let instances = document.beside.instances.get(&number);
         let Some(mesh) = row.mesh else {
             if instances.is_some() {
-                output.notes.add(object, "has instances, but no mesh; left out");
+                let text = "has instances, but no mesh; left out";
+                output.notes.add(Category::Geometry, object, text);
             }
             return Ok(());
         };
+        if document.get(mesh).is_none() {
+            // Whether it would emit is not known.
+            let text = "its mesh is not in the file; left out";
+            output.notes.add(Category::Lights, object, text);
+            return Ok(());
+        }
         let (lux, values) = (lux.as_ref(), values.as_ref());
         let visibility = lights::visibility(lux);
         let placed = Placed { lux, shaping, values, forced, visibility, has_light, object };
         let Some(instances) = instances else {
             return self.put_mesh(output, mesh, node, &placed);
         };
-        for (i, local) in
-            instancing::transforms(self.source, output, instances, object)?.into_iter().enumerate()
-        {
+        let locals = match instancing::transforms(self.source, output, instances, object)? {
+            Ok(locals) => locals,
+            Err(problem) => {
+                let category = self.meshes.category(self.source, mesh);
+                let text = format!("its instances cannot be read ({problem}); left out");
+                output.notes.add(category, object, text);
+                return Ok(());
+            }
+        };
+        for (i, local) in locals.into_iter().enumerate() {
             let path = format!("{}[{i}]", output.scene.nodes[node as usize].path);
             let child = self.push(output, Node::fixed(path, Some(node), local))?;
             // The light of a node is not its instances'.
@@ -179,7 +192,7 @@ impl Walk<'_> {
         placed: &Placed,
     ) -> Result<(), Fault> {
         if let Some(radius) = placed.sphere_radius()? {
-            let material = self.meshes.only_material(self.source, output, mesh)?;
+            let material = self.meshes.only_material(self.source, output, mesh);
             let material = material.map(|m| &output.scene.materials[m as usize]);
             if let Some(material) = material.filter(|_| self.uniform[node as usize])
                 && material.emission_texture.is_none()
@@ -189,10 +202,9 @@ impl Walk<'_> {
                 output.scene.lights.push(Light { values, ..sphere });
                 return Ok(());
             }
-            output.notes.add(
-                placed.object,
-                "its sphere is stretched or textured; sampled as the triangles that stand for it",
-            );
+            let text =
+                "its sphere is stretched or textured; sampled as the triangles that stand for it";
+            output.notes.add(Category::Lights, placed.object, text);
         }
         let compiled = self.meshes.primitives(self.source, output, mesh)?;
         let row = &self.source.document.meshes[mesh.value()];
@@ -213,9 +225,8 @@ impl Walk<'_> {
             output.budget.take(bytes as u64, || placed.object.to_string())?;
             let values = placed.copy_values(output)?;
             if values.is_some() && output.scene.material_of(mesh).is_none() {
-                output
-                    .notes
-                    .add(placed.object, "its light varies, but its mesh has no material; dark");
+                let text = "its light varies, but its mesh has no material; dark";
+                output.notes.add(Category::Lights, placed.object, text);
             }
             let lit = Instance { path, node, mesh, values, shaping, forced, visibility };
             output.scene.instances.push(lit);
@@ -224,17 +235,32 @@ impl Walk<'_> {
     }
 }
 
-fn local(row: &Transform) -> Trs {
+/// The transform of a node. Whatever it says can be composed; what had to be mended is noted.
+fn local(row: &Transform, mut note: impl FnMut(&'static str)) -> Trs {
     if let Some(matrix) = row.matrix {
         let columns = matrix.map(|value| value.f64());
+        let last_row = [columns[3], columns[7], columns[11], columns[15] - 1.0];
+        if last_row.iter().any(|part| part.abs() > AFFINE_TOLERANCE) {
+            note("its matrix is not affine; its last row is taken for 0 0 0 1");
+        }
+        if row.translation.is_some() || row.rotation.is_some() || row.scale.is_some() {
+            note("has a matrix beside translation, rotation or scale; the matrix counts");
+        }
         return Trs::Matrix(DAffine3::from_mat4(DMat4::from_cols_array(&columns)));
     }
     let vector = |values: [Real; 3]| DVec3::from(values.map(|value| value.f64()));
     let rotation = row.rotation.map(|parts| DQuat::from_array(parts.map(|part| part.f64())));
+    let rotation = rotation.unwrap_or(DQuat::IDENTITY);
+    let length = rotation.length();
+    if (length - 1.0).abs() > QUATERNION_TOLERANCE {
+        note(
+            "its rotation is not a unit quaternion; brought to length 1, or left out if it has none",
+        );
+    }
+    let has_direction = length > 0.0 && length.is_finite();
     Trs::Parts {
         translation: row.translation.map_or(DVec3::ZERO, vector),
-        // Validation has seen that it has a length.
-        rotation: rotation.map_or(DQuat::IDENTITY, DQuat::normalize),
+        rotation: if has_direction { rotation / length } else { DQuat::IDENTITY },
         scale: row.scale.map_or(DVec3::ONE, vector),
     }
 }

@@ -1,15 +1,16 @@
 //! Lights that are not meshes: `KHR_lights_punctual`, and what `extras.usdLux` adds.
 
-use super::document::{UsdLux, UsdValues, reals};
+use super::document::{UsdLux, UsdValues, label, reals};
 use super::{Output, Source};
 use crate::ingest::error::Fault;
 use crate::ingest::image::{self, Coding};
 use crate::math::color::Rgb;
 use crate::scene::{
-    Interpolation, Keys, Light, LightKind, Material, Shaping, Texture, Visibility, Wrap,
+    Category, Interpolation, Keys, Light, LightKind, Material, Shaping, Texture, Visibility, Wrap,
 };
 use gltf::json::extensions::scene::khr_lights_punctual::{Light as Row, Type};
 use gltf::json::validation::Checked;
+use std::f32::consts::{FRAC_PI_2, FRAC_PI_4};
 
 /// More keys than this are refused: half a day of frames at 24 a second.
 const MOST_KEYS: usize = 1 << 20;
@@ -50,7 +51,7 @@ impl Placed<'_> {
     }
 }
 
-/// The light at a node, other than its meshes; constant.
+/// The light at a node, other than its meshes; constant. One that cannot be read is left out.
 pub(super) fn of_node(
     source: &Source,
     output: &mut Output,
@@ -60,55 +61,91 @@ pub(super) fn of_node(
     object: &str,
 ) -> Result<Option<Light>, Fault> {
     let (forced, visibility) = (lux.is_some_and(|lux| lux.force), visibility(lux));
-    let light =
-        |kind, range_m| Some(Light { node, kind, values: None, range_m, forced, visibility });
+    let light = |kind, range_m| Light { node, kind, values: None, range_m, forced, visibility };
     if let Some(lux) = lux.filter(|lux| lux.kind == "DomeLight") {
-        return Ok(light(dome(source, output, lux, object)?, None));
+        return Ok(dome(source, output, lux, object)?.map(|kind| light(kind, None)));
     }
-    let Some(punctual) = source.document.light_at(number) else {
+    let Some(index) = source.document.light_at(number) else {
         if let Some(lux) = lux.filter(|_| source.document.nodes[number].mesh.is_none()) {
-            output.notes.add(object, format!("a {} has no carrier in glTF; left out", lux.kind));
+            let text = format!("a {} has no carrier in glTF; left out", lux.kind);
+            output.notes.add(Category::Lights, object, text);
         }
         return Ok(None);
     };
-    let punctual = &source.document.lights()[punctual.value()];
-    let kind = match shaping(lux, object)? {
-        Some(shaping) if punctual.type_ != Checked::Valid(Type::Directional) => {
-            LightKind::Spot { intensity_cd: strength(punctual, object)?, shaping }
-        }
-        _ => punctual_kind(punctual, lux, object)?,
+    let Some(row) = source.document.get(index) else {
+        output.notes.add(Category::Lights, object, "its light is not in the file; left out");
+        return Ok(None);
     };
+    let shaping = shaping(lux, object)?;
+    let angle = lux.and_then(|lux| lux.angle).map_or(0.0, |angle| angle.f32());
+    if !(0.0..=360.0).contains(&angle) {
+        return Err(Fault::new(object, "extras.usdLux: angle is not in [0, 360]"));
+    }
+    let object = label("light", index.value(), row.name.as_deref());
+    let mut note = |text: String| output.notes.add(Category::Lights, &*object, text);
+    let Some(kind) = punctual(row, shaping, angle, &mut note) else { return Ok(None) };
     let is_distant = matches!(kind, LightKind::Distant { .. });
-    let range_m = punctual.range.filter(|_| !is_distant);
-    Ok(light(kind, range_m))
+    let range_m = row.range.filter(|range| *range > 0.0 && range.is_finite() && !is_distant);
+    if range_m.is_none() && row.range.is_some() && !is_distant {
+        note("its range is not positive; it has none".into());
+    }
+    Ok(Some(light(kind, range_m)))
 }
 
-fn punctual_kind(row: &Row, lux: Option<&UsdLux>, object: &str) -> Result<LightKind, Fault> {
-    let strength = strength(row, object)?;
-    Ok(match (row.type_, &row.spot) {
-        (Checked::Valid(Type::Directional), _) => {
-            let angle = lux.and_then(|lux| lux.angle).map_or(0.0, |angle| angle.f32());
-            if !(0.0..=360.0).contains(&angle) {
-                return Err(Fault::new(object, "extras.usdLux: angle is not in [0, 360]"));
-            }
-            LightKind::Distant { irradiance_lux: strength, angle_rad: angle.to_radians() }
+/// What a row of `KHR_lights_punctual` is, but for its range; `None` if that cannot be told.
+fn punctual(
+    row: &Row,
+    shaping: Option<Shaping>,
+    angle_deg: f32,
+    note: &mut impl FnMut(String),
+) -> Option<LightKind> {
+    let Checked::Valid(kind) = row.type_ else {
+        note("is of an unknown type; left out".into());
+        return None;
+    };
+    let strength = Rgb::from(row.color).max(Rgb::ZERO) * row.intensity;
+    if !strength.is_finite() || row.intensity < 0.0 {
+        note("its light is negative, or too strong for a 32-bit number; left out".into());
+        return None;
+    }
+    if row.color.iter().any(|&part| part < 0.0) {
+        note("its colour is negative in part; that part is left out".into());
+    }
+    Some(match (kind, shaping) {
+        (Type::Directional, _) => {
+            LightKind::Distant { irradiance_lux: strength, angle_rad: angle_deg.to_radians() }
         }
-        (Checked::Valid(Type::Spot), Some(spot)) => {
-            let (inner, outer) = (spot.inner_cone_angle, spot.outer_cone_angle);
-            let outer_rad = outer.min(std::f32::consts::FRAC_PI_2);
-            let shaping = Shaping::Khr { inner_rad: inner.min(outer_rad), outer_rad };
-            LightKind::Spot { intensity_cd: strength, shaping }
-        }
-        _ => LightKind::Point { intensity_cd: strength },
+        (_, Some(shaping)) => LightKind::Spot { intensity_cd: strength, shaping },
+        (Type::Point, None) => LightKind::Point { intensity_cd: strength },
+        (Type::Spot, None) => LightKind::Spot { intensity_cd: strength, shaping: cone(row, note)? },
     })
 }
 
-fn strength(row: &Row, object: &str) -> Result<Rgb, Fault> {
-    let strength = Rgb::from(row.color) * row.intensity;
-    match strength.is_finite() {
-        true => Ok(strength),
-        false => Err(Fault::new(object, "its light is too strong for a 32-bit number")),
+/// The cone of a spot. Equal angles are a hard edge; some programs write angles that only 64 bits tell apart.
+fn cone(row: &Row, note: &mut impl FnMut(String)) -> Option<Shaping> {
+    let (inner, outer) = match &row.spot {
+        Some(spot) => (spot.inner_cone_angle, spot.outer_cone_angle),
+        None => {
+            note("is a spot without cone angles; it has the default, 0 and pi/4".into());
+            (0.0, FRAC_PI_4)
+        }
+    };
+    if outer.is_nan() || outer <= 0.0 {
+        note("is a spot whose outer cone angle is not positive; left out".into());
+        return None;
     }
+    if outer > FRAC_PI_2 + 1e-6 {
+        note("is a spot whose outer cone angle is larger than pi/2; pi/2 instead".into());
+    }
+    let outer_rad = outer.min(FRAC_PI_2);
+    if !(0.0..=outer).contains(&inner) {
+        note(
+            "is a spot whose inner cone angle is not between 0 and the outer; its edge is hard"
+                .into(),
+        );
+        return Some(Shaping::Khr { inner_rad: outer_rad, outer_rad });
+    }
+    Some(Shaping::Khr { inner_rad: inner.min(outer_rad), outer_rad })
 }
 
 /// The strength over time that `extras.usdLux` gives, in the light's own unit. One key if it is
@@ -176,32 +213,42 @@ pub(super) fn visibility(lux: Option<&UsdLux>) -> Visibility {
     }
 }
 
+/// A dome; `None` if its texture cannot be read: without it, it would be far too bright.
 fn dome(
     source: &Source,
     output: &mut Output,
     lux: &UsdLux,
     object: &str,
-) -> Result<LightKind, Fault> {
+) -> Result<Option<LightKind>, Fault> {
     let radiance = lux.radiance.map_or([1.0; 3], reals);
     if radiance.iter().any(|&part| part < 0.0) {
         return Err(Fault::new(object, "extras.usdLux: radiance is negative"));
     }
-    let texture = match &lux.texture {
-        Some(uri) => {
-            let object = format!("{object}, dome texture {uri:?}");
-            let bytes = source.folder.read_uri(uri, &object)?;
-            let picture = image::decode(&bytes, Coding::Srgb, &object, &mut output.picture_budget)?;
-            output.scene.textures.push(Texture {
-                name: uri.clone(),
-                width: picture.width,
-                height: picture.height,
-                pixels: picture.pixels,
-                wrap: [Wrap::Repeat, Wrap::Clamp],
-                bilinear: true,
-            });
-            Some(output.scene.textures.len() as u32 - 1)
-        }
-        None => None,
+    let radiance_nits = radiance.into();
+    let Some(uri) = &lux.texture else {
+        return Ok(Some(LightKind::Dome { radiance_nits, texture: None }));
     };
-    Ok(LightKind::Dome { radiance_nits: radiance.into(), texture })
+    let object = format!("{object}, dome texture {uri:?}");
+    let picture = source
+        .folder
+        .read_uri(uri, &object)
+        .and_then(|bytes| image::decode(&bytes, Coding::Srgb, &object, &mut output.picture_budget));
+    let picture = match picture {
+        Ok(picture) => picture,
+        Err(fault) => {
+            let text = format!("{}; the dome is left out", fault.into_problem());
+            output.notes.add(Category::Lights, object, text);
+            return Ok(None);
+        }
+    };
+    output.scene.textures.push(Texture {
+        name: uri.clone(),
+        width: picture.width,
+        height: picture.height,
+        pixels: picture.pixels,
+        wrap: [Wrap::Repeat, Wrap::Clamp],
+        bilinear: true,
+    });
+    let texture = Some(output.scene.textures.len() as u32 - 1);
+    Ok(Some(LightKind::Dome { radiance_nits, texture }))
 }

@@ -1,17 +1,20 @@
 //! Materials, compiled when the first mesh uses them.
+//!
+//! Parameters out of their range are brought into it. What stands in for a texture that cannot be read is
+//! neutral: a middle grey for the base colour, no metal, the surface's own normals, and no light at all for
+//! emission, which would be far too bright without its texture.
 
 use super::document::label;
 use super::textures::Textures;
 use super::{Output, Source};
-use crate::ingest::error::Fault;
-use crate::ingest::image::Coding;
+use crate::ingest::image::{Coding, MISSING_REFLECTANCE};
 use crate::math::color::Rgb;
-use crate::scene::{AlphaMode, Material, TextureUse};
-use gltf::json::extensions::material::PbrSpecularGlossiness;
+use crate::scene::{AlphaMode, Category, Material, TextureUse};
 use gltf::json::material::AlphaMode as RowAlphaMode;
 use gltf::json::texture::Info;
 use gltf::json::validation::Checked;
 use gltf::json::{Index, Material as Row};
+use std::cell::Cell;
 
 /// Reflectance at normal incidence of the default dielectric: index of refraction 1.5.
 const DEFAULT_REFLECTANCE: f32 = 0.04;
@@ -28,23 +31,29 @@ impl Materials {
         Materials { compiled, textures: Textures::default() }
     }
 
-    /// The scene's number of a material of the file.
+    /// The scene's number of a material of the file; `None` if it is not there, which is noted.
     pub(super) fn index(
         &mut self,
         source: &Source,
         output: &mut Output,
         number: Index<Row>,
-    ) -> Result<u32, Fault> {
+        object: &str,
+    ) -> Option<u32> {
+        let Some(row) = source.document.get(number) else {
+            // Whether it would emit is not known.
+            let text = "its material is not in the file; it has the default, and does not emit";
+            output.notes.add(Category::Lights, object, text);
+            return None;
+        };
         if let Some(known) = self.compiled[number.value()] {
-            return Ok(known);
+            return Some(known);
         }
-        let row = &source.document.materials[number.value()];
         let object = label("material", number.value(), row.name.as_deref());
-        let material = self.compile(source, output, number.value(), object)?;
+        let material = self.compile(source, output, number.value(), object);
         output.scene.materials.push(material);
         let index = output.scene.materials.len() as u32 - 1;
         self.compiled[number.value()] = Some(index);
-        Ok(index)
+        Some(index)
     }
 
     fn compile(
@@ -53,91 +62,184 @@ impl Materials {
         output: &mut Output,
         number: usize,
         object: String,
-    ) -> Result<Material, Fault> {
+    ) -> Material {
         let row = &source.document.materials[number];
-        let mut texture = |info: &Option<Info>, coding| -> Result<_, Fault> {
-            match info {
-                Some(info) => self.textures.texture_use(source, output, info, coding),
-                None => Ok(None),
-            }
-        };
         let pbr = &row.pbr_metallic_roughness;
         let none = Default::default();
         let extensions = row.extensions.as_ref().unwrap_or(&none);
-        let [red, green, blue, opacity] = pbr.base_color_factor.0;
-        let strength = extensions.emissive_strength.as_ref();
-        let strength = strength.map_or(1.0, |strength| strength.emissive_strength.0);
-        let emission = Rgb::from(row.emissive_factor.0) * strength;
-        if !emission.is_finite() {
-            return Err(Fault::new(object, "its emission is too strong for a 32-bit number"));
-        }
+        let mended = Cell::new(false);
+        let within = |value: f32, least: f32, most: f32, spare: f32| {
+            let inside = if value.is_finite() { value.clamp(least, most) } else { spare };
+            mended.set(mended.get() || inside != value);
+            inside
+        };
+        let base = pbr.base_color_factor.0.map(|part| within(part, 0.0, 1.0, 1.0));
         let mut material = Material {
             name: row.name.clone().unwrap_or_else(|| object.clone()),
-            base_color: Rgb::new(red, green, blue),
-            base_color_texture: None,
-            opacity,
+            base_color: Rgb::new(base[0], base[1], base[2]),
+            opacity: base[3],
             alpha_mode: match row.alpha_mode {
                 Checked::Valid(RowAlphaMode::Mask) => {
-                    AlphaMode::Mask(row.alpha_cutoff.unwrap_or_default().0)
+                    let cutoff = row.alpha_cutoff.unwrap_or_default().0;
+                    AlphaMode::Mask(within(cutoff, 0.0, f32::MAX, 0.5))
                 }
                 Checked::Valid(RowAlphaMode::Blend) => AlphaMode::Blend,
                 _ => AlphaMode::Opaque,
             },
-            metallic: pbr.metallic_factor.0,
-            roughness: pbr.roughness_factor.0,
-            emission_nits: emission,
+            metallic: within(pbr.metallic_factor.0, 0.0, 1.0, 1.0),
+            roughness: within(pbr.roughness_factor.0, 0.0, 1.0, 1.0),
             double_sided: row.double_sided,
-            normal_texture: texture(&source.document.beside.normal_maps[number], Coding::Linear)?,
-            normal_scale: row.normal_texture.as_ref().map_or(1.0, |map| map.scale),
             ..Material::default()
         };
-        // A texture that nothing of is left of is not decoded.
-        if emission.max_element() > 0.0 {
-            material.emission_texture = texture(&row.emissive_texture, Coding::Srgb)?;
+        if let Some(map) = &row.normal_texture {
+            material.normal_scale = within(map.scale, f32::MIN, f32::MAX, 1.0);
         }
-        if let Some(ior) = &extensions.ior {
-            material.ior = ior.ior.0;
+        if let Some(ior) = extensions.ior.as_ref().map(|ior| ior.ior.0) {
+            // Zero asks for an infinitely strong reflection, by the extension's own words.
+            material.ior = if ior == 0.0 { 0.0 } else { within(ior, 1.0, f32::MAX, material.ior) };
         }
         if let Some(specular) = &extensions.specular {
-            material.specular = specular.specular_factor.0;
-            material.specular_color = Rgb::from(specular.specular_color_factor.0);
-            if material.specular > 0.0 {
-                material.specular_texture = texture(&specular.specular_texture, Coding::Linear)?;
-                material.specular_color_texture =
-                    texture(&specular.specular_color_texture, Coding::Srgb)?;
-            }
+            material.specular = within(specular.specular_factor.0, 0.0, 1.0, 1.0);
+            let color = specular.specular_color_factor.0;
+            material.specular_color = color.map(|part| within(part, 0.0, f32::MAX, 1.0)).into();
         }
         if let Some(glossy) = &extensions.pbr_specular_glossiness {
-            material.base_color_texture = texture(&glossy.diffuse_texture, Coding::Srgb)?;
-            approximate_glossiness(&mut material, glossy);
-            output.notes.add(
-                object.clone(),
-                "KHR_materials_pbrSpecularGlossiness is approximated; its specular texture is not read",
-            );
-        } else {
-            material.base_color_texture = texture(&pbr.base_color_texture, Coding::Srgb)?;
-            material.metallic_roughness_texture =
-                texture(&pbr.metallic_roughness_texture, Coding::Linear)?;
+            let diffuse = glossy.diffuse_factor.0.map(|part| within(part, 0.0, 1.0, 1.0));
+            let specular = glossy.specular_factor.0.map(|part| within(part, 0.0, 1.0, 1.0));
+            let gloss = within(glossy.glossiness_factor.0, 0.0, 1.0, 1.0);
+            approximate_glossiness(&mut material, diffuse, specular, gloss);
         }
+        if mended.get() {
+            let text = "has parameters out of their range; brought into it";
+            output.notes.add(Category::Materials, &*object, text);
+        }
+        if row.alpha_mode == Checked::Invalid {
+            let text = "its alpha mode is unknown; opaque";
+            output.notes.add(Category::Materials, &*object, text);
+        }
+        self.emit(source, output, number, &object, &mut material);
+        self.add_textures(source, output, number, &object, &mut material);
         for extension in extensions.others.keys() {
             let text = match extension.as_str() {
                 "KHR_materials_unlit" => "is unlit; drawn as a surface that light falls on".into(),
                 extension => format!("{extension} is not read"),
             };
-            output.notes.add(object.clone(), text);
+            output.notes.add(Category::Materials, &*object, text);
         }
-        Ok(material)
+        material
+    }
+
+    /// Adds the emission, which is left out where it cannot be read.
+    fn emit(
+        &mut self,
+        source: &Source,
+        output: &mut Output,
+        number: usize,
+        object: &str,
+        material: &mut Material,
+    ) {
+        let row = &source.document.materials[number];
+        let strength = row.extensions.as_ref().and_then(|e| e.emissive_strength.as_ref());
+        let strength = strength.map_or(1.0, |strength| strength.emissive_strength.0);
+        let factor = Rgb::from(row.emissive_factor.0);
+        let emission = factor.max(Rgb::ZERO) * strength;
+        let mut note = |text: String| output.notes.add(Category::Lights, object, text);
+        if !emission.is_finite() || !factor.is_finite() || strength < 0.0 {
+            note("its light is negative, or too strong for a 32-bit number; left out".into());
+            return;
+        }
+        if factor.min_element() < 0.0 {
+            note("its emissive colour is negative in part; that part is left out".into());
+        }
+        // A texture that nothing of is left of is not decoded.
+        let texture = row.emissive_texture.as_ref().filter(|_| emission.max_element() > 0.0);
+        let texture =
+            texture.map(|info| self.textures.texture_use(source, output, info, Coding::Srgb));
+        match texture.transpose() {
+            Ok(texture) => {
+                material.emission_nits = emission;
+                material.emission_texture = texture;
+            }
+            Err(problem) => {
+                let text = format!("{problem}; its light is left out");
+                output.notes.add(Category::Lights, object, text);
+            }
+        }
+    }
+
+    /// Adds the textures of what it reflects. Where one cannot be read what stands in for it is neutral.
+    fn add_textures(
+        &mut self,
+        source: &Source,
+        output: &mut Output,
+        number: usize,
+        object: &str,
+        material: &mut Material,
+    ) {
+        let row = &source.document.materials[number];
+        let pbr = &row.pbr_metallic_roughness;
+        let none = Default::default();
+        let extensions = row.extensions.as_ref().unwrap_or(&none);
+        // The texture, and whether it is asked for but cannot be read.
+        let mut texture = |info: Option<&Info>, coding, instead: &str| match info {
+            None => (None, false),
+            Some(info) => match self.textures.texture_use(source, output, info, coding) {
+                Ok(texture) => (Some(texture), false),
+                Err(problem) => {
+                    let text = format!("{problem}; {instead}");
+                    output.notes.add(Category::Materials, object, text);
+                    (None, true)
+                }
+            },
+        };
+        let map = source.document.beside.normal_maps[number].as_ref();
+        (material.normal_texture, _) =
+            texture(map, Coding::Linear, "its surfaces are drawn without a normal map");
+        let glossy = extensions.pbr_specular_glossiness.as_ref();
+        let base = match glossy {
+            Some(glossy) => glossy.diffuse_texture.as_ref(),
+            None => pbr.base_color_texture.as_ref(),
+        };
+        let (base, is_missing) = texture(base, Coding::Srgb, "its base colour is grey instead");
+        material.base_color_texture = base;
+        if is_missing {
+            material.base_color *= MISSING_REFLECTANCE;
+        }
+        if glossy.is_none() {
+            let info = pbr.metallic_roughness_texture.as_ref();
+            let instead = "it is no metal, and as rough as its factor says";
+            let (rough, is_missing) = texture(info, Coding::Linear, instead);
+            material.metallic_roughness_texture = rough;
+            if is_missing {
+                material.metallic = 0.0;
+            }
+        }
+        if let Some(specular) = extensions.specular.as_ref().filter(|_| material.specular > 0.0) {
+            let instead = "it reflects as its factor says";
+            let (strength, color) = (&specular.specular_texture, &specular.specular_color_texture);
+            (material.specular_texture, _) = texture(strength.as_ref(), Coding::Linear, instead);
+            (material.specular_color_texture, _) = texture(color.as_ref(), Coding::Srgb, instead);
+        }
+        if glossy.is_some() {
+            let text = "KHR_materials_pbrSpecularGlossiness is approximated; its specular texture is not read";
+            output.notes.add(Category::Materials, object, text);
+        }
     }
 }
 
 /// A dielectric of the same diffuse colour, roughness and reflectance.
-fn approximate_glossiness(material: &mut Material, glossy: &PbrSpecularGlossiness) {
-    let [red, green, blue, opacity] = glossy.diffuse_factor.0;
+fn approximate_glossiness(
+    material: &mut Material,
+    diffuse: [f32; 4],
+    specular: [f32; 3],
+    glossiness: f32,
+) {
+    let [red, green, blue, opacity] = diffuse;
     material.base_color = Rgb::new(red, green, blue);
     material.opacity = opacity;
     material.metallic = 0.0;
-    material.roughness = 1.0 - glossy.glossiness_factor.0;
-    material.specular_color = Rgb::from(glossy.specular_factor.0) / DEFAULT_REFLECTANCE;
+    material.roughness = 1.0 - glossiness;
+    material.specular_color = Rgb::from(specular) / DEFAULT_REFLECTANCE;
 }
 
 /// The texture sets that a material's textures are looked up by.

@@ -1,35 +1,56 @@
-//! glTF 2.0: container, document, validation, then compilation to the scene index.
+//! glTF 2.0: container, document, then compilation to the scene index.
+//!
+//! Whatever is asked of the document may be wrong: a number may lead nowhere, an array may have the wrong type,
+//! a parameter may be out of range. Who asks finds out, leaves the object out or mends it, and notes it. Refused
+//! is only what cannot be read safely, or not at all: another version, cycles among the nodes, a truncated
+//! buffer, memory out of proportion to the file.
+//!
+//! | file | what |
+//! |---|---|
+//! | `container` | the JSON and the binary chunk of a file |
+//! | `document` | JSON to typed rows |
+//! | `extensions` | what must be supported |
+//! | `forest` | which nodes are below which |
+//! | `buffers`, `accessors` | arrays in the buffers |
+//! | `hierarchy` | nodes, parents first, and what stands at them |
+//! | `instancing`, `geometry`, `attributes` | meshes |
+//! | `materials`, `textures` | surfaces |
+//! | `lights`, `fog`, `cameras`, `animation` | what they say |
 
 mod accessors;
 mod animation;
+mod attributes;
 mod buffers;
 mod cameras;
 mod container;
 mod document;
+mod extensions;
 mod fog;
+mod forest;
 mod geometry;
 mod hierarchy;
 mod instancing;
 mod lights;
 mod materials;
 mod textures;
-mod validate;
 
 use super::budget::Budget;
 use super::error::Fault;
 use super::notes::Notes;
 use super::uri::Folder;
 use crate::scene::{Scene, Timeline};
-use accessors::Accessor;
+use accessors::Accessors;
 use buffers::Buffers;
 use container::Container;
 use document::{AssetUsd, Document};
+use forest::Forest;
 use std::path::Path;
 
-/// A validated file, ready to be compiled.
+/// A file, ready to be compiled.
 struct Source<'a> {
     document: &'a Document,
-    accessors: &'a [Accessor<'a>],
+    forest: &'a Forest,
+    accessors: &'a Accessors<'a>,
     buffers: &'a Buffers<'a>,
     folder: &'a Folder,
 }
@@ -42,29 +63,29 @@ struct Output {
     picture_budget: Budget,
 }
 
-/// Reads a file. Only a file called `.glb` must be binary: a `.gltf` may be either.
+/// Reads a file. A file called `.glb` may not be anything else than glTF; a `.gltf` may be binary too.
 pub(super) fn load(path: &Path, must_be_glb: bool) -> Result<Scene, Fault> {
-    let file = Container::parse(super::read_file(path)?, must_be_glb)?;
+    let (mut notes, mut budget) = (Notes::default(), Budget::for_geometry());
+    let file = Container::parse(super::read_file(path)?, must_be_glb, &mut notes)?;
     let folder = Folder::of(path)?;
-    let document = Document::parse(file.json())?;
-    validate::structure(&document)?;
+    budget.grow(file.size() as u64);
+    let document = Document::parse(file.json(), &mut budget, &mut notes)?;
+    extensions::check(&document, &mut notes)?;
+    let forest = Forest::new(&document, &mut notes)?;
     let buffers = Buffers::read(&document, &file, &folder)?;
-    let accessors = Accessor::open_all(&document, &buffers)?;
-    validate::contents(&document, &accessors)?;
-    let source =
-        Source { document: &document, accessors: &accessors, buffers: &buffers, folder: &folder };
-    let mut output = Output {
-        scene: Scene::default(),
-        notes: Notes::default(),
-        budget: Budget::for_geometry(),
-        picture_budget: Budget::for_pictures(),
+    budget.grow(buffers.size());
+    let accessors = Accessors::open(&document, &buffers, &mut budget)?;
+    let source = Source {
+        document: &document,
+        forest: &forest,
+        accessors: &accessors,
+        buffers: &buffers,
+        folder: &folder,
     };
-    output.budget.grow(buffers.size().saturating_add(file.size() as u64));
-    output.scene.timeline = timeline(&document)?;
-    note_unread_extensions(&document, &mut output.notes);
-    textures::check_references(&source)?;
+    let scene = Scene { timeline: timeline(&document)?, ..Scene::default() };
+    let mut output = Output { scene, notes, budget, picture_budget: Budget::for_pictures() };
     hierarchy::compile(&source, &mut output)?;
-    output.scene.notes = output.notes.into_lines();
+    output.scene.notes = output.notes.into_list();
     output.scene.files = folder.into_files(path);
     Ok(output.scene)
 }
@@ -82,14 +103,4 @@ fn timeline(document: &Document) -> Result<Timeline, Fault> {
         frames_per_second: rate,
         last_frame: usd.end_time_code.map(|code| code.f64()),
     })
-}
-
-/// Extensions that change a picture and are not noted at the object that uses them.
-fn note_unread_extensions(document: &Document, notes: &mut Notes) {
-    for extension in &document.extensions_used {
-        let whole_file = ["EXT_lights_image_based", "EXT_lights_ies", "EXT_lights_area"];
-        if whole_file.contains(&extension.as_str()) {
-            notes.add("file", format!("{extension} is not read"));
-        }
-    }
 }

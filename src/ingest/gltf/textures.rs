@@ -4,61 +4,48 @@ use super::document::{label, source as image_of};
 use super::{Output, Source};
 use crate::ingest::error::Fault;
 use crate::ingest::image::{self, Coding};
-use crate::scene::{Texture, TextureUse, Wrap};
+use crate::scene::{Category, Texture, TextureUse, Wrap};
 use glam::{Affine2, Mat2, Vec2};
 use gltf::json::texture::{Info, MagFilter, WrappingMode};
 use gltf::json::validation::Checked;
 use gltf::json::{Image, Index};
 use std::borrow::Cow;
-use std::collections::{HashMap, HashSet};
+use std::collections::HashMap;
 
 /// How a texture's image is sampled: wrapping, bilinear or not, and what its values mean.
 type Rule = ([Wrap; 2], bool, Coding);
+
+/// A number of the scene's textures, or why there is none.
+type Compiled = Result<u32, String>;
 
 /// The textures that were compiled.
 #[derive(Default)]
 pub(super) struct Textures {
     /// By image; few rules exist.
-    compiled: HashMap<Index<Image>, Vec<(Rule, u32)>>,
-    /// Images that cannot be read and were noted.
-    unread: HashSet<Index<Image>>,
-}
-
-/// Every image leads to something inside the scene's folder, whether it is used or not.
-pub(super) fn check_references(source: &Source) -> Result<(), Fault> {
-    for (i, row) in source.document.images.iter().enumerate() {
-        let object = label("image", i, row.name.as_deref());
-        match &row.uri {
-            Some(uri) if uri.starts_with("data:") => drop(source.folder.read_uri(uri, &object)?),
-            Some(uri) => drop(source.folder.resolve_uri(uri, &object)?),
-            None => {}
-        }
-    }
-    Ok(())
+    compiled: HashMap<Index<Image>, Vec<(Rule, Compiled)>>,
 }
 
 impl Textures {
-    /// Compiles a material's use of a texture; `None` if its image is not read.
+    /// Compiles a material's use of a texture; else says why it cannot be read, and of what.
     pub(super) fn texture_use(
         &mut self,
         source: &Source,
         output: &mut Output,
         info: &Info,
         coding: Coding,
-    ) -> Result<Option<TextureUse>, Fault> {
-        let row = &source.document.textures[info.index.value()];
-        let Some(image) = image_of(row) else {
+    ) -> Result<TextureUse, String> {
+        let document = source.document;
+        let absent = || format!("texture {} is not in the file", info.index);
+        let row = document.get(info.index).ok_or_else(absent)?;
+        let image = image_of(row).ok_or_else(|| {
             let object = label("texture", info.index.value(), row.name.as_deref());
-            output.notes.add(object, "has no image that can be read; drawn without");
-            return Ok(None);
-        };
-        let sampler = row.sampler.map(|sampler| &source.document.samplers[sampler.value()]);
+            format!("{object} has no image in a format that is read")
+        })?;
+        let sampler = row.sampler.and_then(|sampler| document.get(sampler));
         let wrap = sampler.map_or([Wrap::Repeat; 2], |s| [s.wrap_s, s.wrap_t].map(wrap));
         let nearest = Some(Checked::Valid(MagFilter::Nearest));
         let bilinear = sampler.and_then(|s| s.mag_filter) != nearest;
-        let Some(texture) = self.texture(source, output, image, (wrap, bilinear, coding))? else {
-            return Ok(None);
-        };
+        let texture = self.texture(source, output, image, (wrap, bilinear, coding))?;
         let extensions = info.extensions.as_ref();
         let transform = extensions.and_then(|extensions| extensions.texture_transform.as_ref());
         let uv_set = transform.and_then(|transform| transform.tex_coord).unwrap_or(info.tex_coord);
@@ -71,7 +58,13 @@ impl Textures {
                 translation: transform.offset.0.into(),
             }
         });
-        Ok(Some(TextureUse { texture, uv_set, transform }))
+        if transform.is_some_and(|transform| !transform.is_finite()) {
+            let object = label("texture", info.index.value(), row.name.as_deref());
+            let text = "has a transform that is not finite; left out";
+            output.notes.add(Category::Materials, object, text);
+        }
+        let transform = transform.filter(Affine2::is_finite);
+        Ok(TextureUse { texture, uv_set, transform })
     }
 
     fn texture(
@@ -80,39 +73,43 @@ impl Textures {
         output: &mut Output,
         image: Index<Image>,
         rule: Rule,
-    ) -> Result<Option<u32>, Fault> {
+    ) -> Result<u32, String> {
         let known = self.compiled.get(&image).into_iter().flatten();
         if let Some((_, texture)) = known.into_iter().find(|(known, _)| *known == rule) {
-            return Ok(Some(*texture));
+            return texture.clone();
         }
-        if self.unread.contains(&image) {
-            return Ok(None);
-        }
-        let row = &source.document.images[image.value()];
-        let object = label("image", image.value(), row.name.as_deref());
-        let bytes = bytes(source, row, &object)?;
-        if !image::is_surface_format(&bytes) {
-            output.notes.add(object, "is neither PNG nor JPEG; drawn without");
-            self.unread.insert(image);
-            return Ok(None);
-        }
-        let (wrap, bilinear, coding) = rule;
-        let picture = image::decode(&bytes, coding, &object, &mut output.picture_budget)?;
-        let uri = row.uri.as_deref().filter(|uri| !uri.starts_with("data:"));
-        let name = row.name.as_deref().or(uri).unwrap_or(&object).to_string();
-        let (width, height, pixels) = (picture.width, picture.height, picture.pixels);
-        output.scene.textures.push(Texture { name, width, height, pixels, wrap, bilinear });
-        let texture = output.scene.textures.len() as u32 - 1;
-        self.compiled.entry(image).or_default().push((rule, texture));
-        Ok(Some(texture))
+        let texture = decode(source, output, image, rule).map_err(Fault::told);
+        self.compiled.entry(image).or_default().push((rule, texture.clone()));
+        texture
     }
 }
 
+fn decode(
+    source: &Source,
+    output: &mut Output,
+    image: Index<Image>,
+    (wrap, bilinear, coding): Rule,
+) -> Result<u32, Fault> {
+    let row = source.document.get(image);
+    let row = row.ok_or_else(|| Fault::new(format!("image {image}"), "is not in the file"))?;
+    let object = label("image", image.value(), row.name.as_deref());
+    let bytes = bytes(source, row, &object)?;
+    let picture = image::decode_surface(&bytes, coding, &object, &mut output.picture_budget)?;
+    let uri = row.uri.as_deref().filter(|uri| !uri.starts_with("data:"));
+    let name = row.name.as_deref().or(uri).unwrap_or(&object).to_string();
+    let (width, height, pixels) = (picture.width, picture.height, picture.pixels);
+    output.scene.textures.push(Texture { name, width, height, pixels, wrap, bilinear });
+    Ok(output.scene.textures.len() as u32 - 1)
+}
+
 fn bytes<'a>(source: &'a Source, row: &Image, object: &str) -> Result<Cow<'a, [u8]>, Fault> {
+    let fault = |problem| Fault::new(object, problem);
     match (row.buffer_view, &row.uri) {
-        (Some(view), _) => Ok(Cow::Borrowed(source.buffers.view(source.document, view, object)?)),
+        (Some(view), _) => {
+            source.buffers.view(source.document, view).map(Cow::Borrowed).map_err(fault)
+        }
         (None, Some(uri)) => Ok(Cow::Owned(source.folder.read_uri(uri, object)?)),
-        (None, None) => Err(Fault::new(object, "has no data")),
+        (None, None) => Err(fault("has no data".into())),
     }
 }
 

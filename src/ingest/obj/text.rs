@@ -1,12 +1,11 @@
-//! The text of OBJ and MTL files, made fit for `tobj`.
+//! The text of OBJ and MTL files: decoded, and cut into statements.
 
-use crate::ingest::error::Fault;
 use std::borrow::Cow;
 
 /// How far into a file a zero byte tells that it is no text.
 const LOOKED_AT_BYTES: usize = 4096;
 
-/// The text of a file; what is not UTF-8 in it (names and comments, in practice) is replaced.
+/// The text of a file. What is not UTF-8 in it (names and comments, in practice) is replaced.
 pub(super) fn decode(bytes: &[u8]) -> Result<Cow<'_, str>, &'static str> {
     if bytes.starts_with(b"\xFF\xFE") || bytes.starts_with(b"\xFE\xFF") {
         return Err("is UTF-16");
@@ -17,77 +16,50 @@ pub(super) fn decode(bytes: &[u8]) -> Result<Cow<'_, str>, &'static str> {
     Ok(String::from_utf8_lossy(bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes)))
 }
 
-/// What a look at every line told.
-pub(super) struct Lines {
-    /// There are polylines, which `tobj` would take for faces.
-    pub polylines: bool,
+/// One statement: a keyword and what follows it.
+#[derive(Debug, PartialEq)]
+pub(super) struct Statement<'a> {
+    /// Number of its first line, from 1 on.
+    pub line: usize,
+    pub keyword: Cow<'a, str>,
+    /// The rest, trimmed.
+    pub rest: Cow<'a, str>,
 }
 
-/// Checks the corners of faces: `tobj` computes with indices before it looks at their range.
-pub(super) fn check(text: &str) -> Result<Lines, Fault> {
-    let mut lines = Lines { polylines: false };
-    // Positions, texture coordinates and normals so far: what a negative index counts back from.
-    let mut counts = [0i64; 3];
-    for (i, line) in text.lines().enumerate() {
-        let mut words = line.split_whitespace();
-        match words.next() {
-            Some("v") => counts[0] += 1,
-            Some("vt") => counts[1] += 1,
-            Some("vn") => counts[2] += 1,
-            Some("l") => lines.polylines = true,
-            Some("f") => {
-                for corner in words {
-                    check_corner(corner, &counts).map_err(|problem| {
-                        Fault::new(format!("line {}", i + 1), format!("{corner:?} {problem}"))
-                    })?;
+/// The statements of a text. A backslash at the end of a line joins the next one to it.
+pub(super) fn statements(text: &str) -> impl Iterator<Item = Statement<'_>> {
+    let mut lines = text.lines().enumerate();
+    std::iter::from_fn(move || {
+        loop {
+            let (number, first) = lines.next()?;
+            let mut whole = Cow::Borrowed(first.trim());
+            while let Some(head) = whole.strip_suffix('\\') {
+                let next = lines.next().map_or("", |(_, next)| next.trim());
+                whole = Cow::Owned(format!("{head} {next}"));
+            }
+            if whole.is_empty() || whole.starts_with('#') {
+                continue;
+            }
+            let line = number + 1;
+            return Some(match whole {
+                Cow::Borrowed(whole) => {
+                    let (keyword, rest) = cut(whole);
+                    Statement { line, keyword: keyword.into(), rest: rest.into() }
                 }
-            }
-            _ => {}
+                Cow::Owned(whole) => {
+                    let (keyword, rest) = cut(&whole);
+                    let (keyword, rest) = (keyword.to_string(), rest.to_string());
+                    Statement { line, keyword: keyword.into(), rest: rest.into() }
+                }
+            });
         }
-    }
-    Ok(lines)
+    })
 }
 
-fn check_corner(corner: &str, counts: &[i64; 3]) -> Result<(), &'static str> {
-    for (i, index) in corner.split('/').enumerate() {
-        let Some(count) = counts.get(i) else { return Err("has more than three indices") };
-        if index.is_empty() && i > 0 {
-            continue;
-        }
-        match index.parse::<i64>() {
-            Ok(0) => return Err("has an index of 0; OBJ counts from 1"),
-            Ok(index) if -*count <= index && index <= i64::from(u32::MAX) => {}
-            Ok(_) => return Err("has an index out of range"),
-            Err(_) => return Err("is not a corner of a face"),
-        }
-    }
-    Ok(())
-}
-
-/// The text without polylines.
-pub(super) fn without_polylines(text: &str) -> String {
-    let is_polyline = |line: &&str| line.split_whitespace().next() == Some("l");
-    let kept: Vec<&str> = text.lines().filter(|line| !is_polyline(line)).collect();
-    kept.join("\n")
-}
-
-/// The text of a material library in which colours have three numbers each, as `tobj` takes for granted:
-/// by the MTL specification one alone stands for all three.
-pub(super) fn with_whole_colors(text: &str) -> Result<String, String> {
-    let whole = |(i, line): (usize, &str)| {
-        let words: Vec<&str> = line.split_whitespace().collect();
-        match words[..] {
-            [name @ ("Ka" | "Kd" | "Ks" | "Ke"), grey] => {
-                Ok(format!("{name} {grey} {grey} {grey}"))
-            }
-            ["Ka" | "Kd" | "Ks" | "Ke"] | ["Ka" | "Kd" | "Ks" | "Ke", _, _] => {
-                Err(format!("line {}: a colour has one number or three", i + 1))
-            }
-            _ => Ok(line.to_string()),
-        }
-    };
-    let lines: Result<Vec<String>, String> = text.lines().enumerate().map(whole).collect();
-    Ok(lines?.join("\n"))
+/// The first word, and the rest without the space around it.
+pub(super) fn cut(text: &str) -> (&str, &str) {
+    let (word, rest) = text.split_once(char::is_whitespace).unwrap_or((text, ""));
+    (word, rest.trim())
 }
 
 #[cfg(test)]
@@ -95,33 +67,18 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_colour_of_one_number_is_grey_and_of_two_is_none() {
-        let text = "newmtl a\n Ke 4\nKd 1 .5 0\n# Ks 1";
-        let whole = with_whole_colors(text).unwrap();
-        assert_eq!(whole, "newmtl a\nKe 4 4 4\nKd 1 .5 0\n# Ks 1");
-        for bad in ["Ke", "newmtl a\nKs 1 2"] {
-            assert!(with_whole_colors(bad).unwrap_err().contains("one number or three"), "{bad}");
-        }
+    fn statements_are_cut() {
+        let text = "# a\n\n  f 1 2 \\\n 3\r\nusemtl\tred wall \r\nv\n f 1 \\";
+        let cut: Vec<_> =
+            statements(text).map(|s| (s.line, s.keyword.to_string(), s.rest.to_string())).collect();
+        let expected = [(3, "f", "1 2  3"), (5, "usemtl", "red wall"), (6, "v", ""), (7, "f", "1")];
+        assert_eq!(cut, expected.map(|(l, k, r)| (l, k.to_string(), r.to_string())));
     }
 
     #[test]
-    fn indices_are_looked_at_before_they_are_used() {
-        let vertices = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvn 0 0 1\n";
-        for good in ["f 1 2 3", "f -3//-1 -2//1 -1//1", "f 1/ 2/ 3/"] {
-            assert!(check(&format!("{vertices}{good}")).is_ok(), "{good}");
-        }
-        for bad in
-            ["f 0 1 2", "f -4 1 2", "f 1/-1 2 3", "f 1 2 9999999999", "f 1/1/1/1 2 3", "f a b c"]
-        {
-            let fault = check(&format!("{vertices}{bad}")).err().expect(bad);
-            assert!(fault.in_file("a".as_ref()).object.contains("line 5"), "{bad}");
-        }
-    }
-
-    #[test]
-    fn polylines_are_no_faces() {
-        let text = "v 0 0 0\n l 1 2 3\nf 1 2 3";
-        assert!(check(&text.replace("f 1 2 3", "")).unwrap().polylines);
-        assert_eq!(without_polylines(text), "v 0 0 0\nf 1 2 3");
+    fn what_is_no_text_is_told() {
+        assert!(decode(b"\xFF\xFEv\0").is_err() && decode(b"v 0\0").is_err());
+        assert_eq!(decode(b"\xEF\xBB\xBFv").unwrap(), "v");
+        assert_eq!(decode(b"caf\xe9").unwrap(), "caf\u{fffd}");
     }
 }

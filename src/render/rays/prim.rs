@@ -1,5 +1,6 @@
 //! What a ray must know of a prim that it meets.
 
+use crate::math::directions::mirrors;
 use crate::scene::{AlphaMode, Pose, Scene, Visibility};
 
 /// Who sent a ray, which decides what it meets.
@@ -48,7 +49,7 @@ impl Prim {
         Prim {
             rank,
             is_cutout: material.is_some_and(|m| m.alpha_mode != AlphaMode::Opaque),
-            mirrors: pose.world(instance.node).matrix3.determinant() < 0.0,
+            mirrors: mirrors(&pose.world(instance.node)),
             visibility: instance.visibility,
             shines: scene.rgb_of_instance(row, pose).max_element() > 0.0,
             two_sided: material.is_some_and(|m| m.double_sided),

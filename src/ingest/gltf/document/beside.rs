@@ -1,12 +1,8 @@
 //! What a file says and the `gltf` crate's types do not, or not well enough.
 
 use super::{Real, Row};
-use gltf::json::accessor::{VALID_ACCESSOR_TYPES, VALID_COMPONENT_TYPES, VALID_INDEX_TYPES};
-use gltf::json::animation::{Sampler, VALID_INTERPOLATIONS};
-use gltf::json::camera::VALID_CAMERA_TYPES;
-use gltf::json::extensions::scene::khr_lights_punctual::VALID_TYPES as VALID_LIGHT_TYPES;
-use gltf::json::material::VALID_ALPHA_MODES;
-use gltf::json::mesh::{Semantic, VALID_MODES};
+use gltf::json::animation::Sampler;
+use gltf::json::mesh::Semantic;
 use gltf::json::validation::Checked;
 use gltf::json::{Accessor, Index, Node, texture};
 use serde::Deserialize;
@@ -88,14 +84,17 @@ pub(in crate::ingest::gltf) struct Pointer {
 }
 
 impl Beside {
-    pub(super) fn node(&mut self, row: &mut Row) -> Prepared {
-        let number = self.transforms.len();
-        self.transforms.push(Transform {
+    /// Takes from a row what is kept beside it. A row may come twice, the second time as what stands for it.
+    pub(super) fn node(&mut self, row: &mut Row, number: usize) -> Prepared {
+        let transform = Transform {
             matrix: take(row, "matrix")?,
             translation: take(row, "translation")?,
             rotation: take(row, "rotation")?,
             scale: take(row, "scale")?,
-        });
+        };
+        put(&mut self.transforms, number, transform);
+        self.instances.remove(&number);
+        self.hidden.remove(&number);
         if let Some(extensions) = row.get_mut("extensions").and_then(Value::as_object_mut) {
             let instances = take(extensions, "EXT_mesh_gpu_instancing")?;
             self.instances.extend(instances.map(|instances| (number, instances)));
@@ -106,16 +105,14 @@ impl Beside {
         Ok(())
     }
 
-    pub(super) fn material(&mut self, row: &mut Row) -> Prepared {
-        known("alpha mode", row.get("alphaMode"), VALID_ALPHA_MODES)?;
+    pub(super) fn material(&mut self, row: &mut Row, number: usize) -> Prepared {
         let normal_map = row.get("normalTexture").map_or(Ok(None), Option::deserialize)?;
-        self.normal_maps.push(normal_map);
+        put(&mut self.normal_maps, number, normal_map);
         Ok(())
     }
 
-    pub(super) fn camera(&mut self, row: &mut Row) -> Prepared {
-        known("type", row.get("type"), VALID_CAMERA_TYPES)?;
-        self.magnifications.push(take(row, "orthographic")?);
+    pub(super) fn camera(&mut self, row: &mut Row, number: usize) -> Prepared {
+        put(&mut self.magnifications, number, take(row, "orthographic")?);
         // glTF's clipping planes are not read: see `carriers.md`.
         if let Some(lens) = row.get_mut("perspective").and_then(Value::as_object_mut) {
             lens.remove("zfar");
@@ -124,24 +121,34 @@ impl Beside {
         Ok(())
     }
 
-    pub(super) fn animation(&mut self, row: &mut Row) -> Prepared {
+    pub(super) fn animation(&mut self, row: &mut Row, number: usize) -> Prepared {
         let channels = row.insert("channels".into(), json!([])).ok_or("has no channels")?;
-        self.channels.push(from_value(channels)?);
-        rows(row, "samplers").try_for_each(|sampler| {
-            known("interpolation", sampler.get("interpolation"), VALID_INTERPOLATIONS)
-        })
+        put(&mut self.channels, number, from_value(channels)?);
+        Ok(())
     }
 }
 
-pub(super) fn accessor(row: &mut Row) -> Prepared {
-    known("component type", row.get("componentType"), VALID_COMPONENT_TYPES)?;
-    known("type", row.get("type"), VALID_ACCESSOR_TYPES)?;
-    let indices = row.get("sparse").and_then(|sparse| sparse.pointer("/indices/componentType"));
-    known("component type of sparse indices", indices, VALID_INDEX_TYPES)
+/// Gives the row of a number, which is the last or the next one.
+fn put<T>(rows: &mut Vec<T>, number: usize, row: T) {
+    rows.truncate(number);
+    rows.push(row);
 }
 
+/// The crate cuts numbers to 32 bits before it looks what they mean.
+pub(super) fn accessor(row: &mut Row) -> Prepared {
+    let sparse = row.get("sparse").and_then(|sparse| sparse.pointer("/indices/componentType"));
+    for kind in row.get("componentType").into_iter().chain(sparse) {
+        if kind.as_u64().is_some_and(|kind| kind > u64::from(u32::MAX)) {
+            return Err(format!("has unknown component type {kind}").into());
+        }
+    }
+    Ok(())
+}
+
+/// A light without a type is of an unknown one.
 pub(super) fn light(row: &mut Row) -> Prepared {
-    known("type", row.get("type"), VALID_LIGHT_TYPES)
+    row.entry("type").or_insert_with(|| json!("none"));
+    Ok(())
 }
 
 /// An empty scene has no nodes; the crate wants the list.
@@ -154,7 +161,10 @@ pub(super) fn scene(row: &mut Row) -> Prepared {
 /// become the application's own: they are not read, but checked like the others.
 pub(super) fn mesh(row: &mut Row) -> Prepared {
     for primitive in rows(row, "primitives") {
-        known("primitive mode", primitive.get("mode"), VALID_MODES)?;
+        if primitive.get("mode").and_then(Value::as_u64).is_some_and(|mode| mode > 6) {
+            // The crate would cut it to eight bits.
+            primitive.insert("mode".into(), json!(u8::MAX));
+        }
         let targets = primitive.get("targets").map_or(Ok(Vec::new()), Vec::<Row>::deserialize)?;
         if let Some(attributes) = primitive.get_mut("attributes").and_then(Value::as_object_mut) {
             for (name, index) in mem::take(attributes) {
@@ -169,19 +179,6 @@ pub(super) fn mesh(row: &mut Row) -> Prepared {
         }
     }
     Ok(())
-}
-
-/// The crate forgets what it does not know, and cuts numbers to 32 bits before it looks.
-fn known<V: Copy>(what: &str, value: Option<&Value>, valid: &[V]) -> Prepared
-where
-    Value: PartialEq<V>,
-{
-    match value {
-        Some(value) if valid.iter().all(|valid| value != valid) => {
-            Err(format!("has unknown {what} {value}").into())
-        }
-        _ => Ok(()),
-    }
 }
 
 fn take<T: DeserializeOwned>(row: &mut Row, key: &str) -> serde_json::Result<Option<T>> {

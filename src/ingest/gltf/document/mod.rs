@@ -1,32 +1,38 @@
 //! The glTF document: crate `gltf`'s, parsed object by object, so that an error names the object.
 //!
 //! Its JSON types are taken, its readers are not: they panic on what is not sound. And what the
-//! types cannot say, or confuse, is taken out of an object [beside] before it is parsed.
+//! types cannot say, or confuse, is taken out of an object [beside] before it is parsed. Numbers of other
+//! objects may lead nowhere: who follows one asks.
 
 mod beside;
 mod extras;
 mod real;
 mod reference;
 
-pub(super) use beside::{Beside, Channel, Instancing, Target, Transform};
+pub(super) use beside::{Beside, Instancing, Target, Transform};
 pub(super) use extras::{AssetUsd, UsdCamera, UsdFog, UsdLux, UsdValues, usd_path};
 pub(super) use real::{Real, reals};
 
+use crate::ingest::budget::Budget;
 use crate::ingest::error::Fault;
+use crate::ingest::notes::Notes;
+use crate::scene::Category;
+use gltf::json::asset::Asset;
 use gltf::json::extensions::root::{KhrLightsPunctual, Root as RootExtensions};
 use gltf::json::extensions::scene::khr_lights_punctual::Light;
 use gltf::json::mesh::Primitive;
-use gltf::json::{Image, Index, Root, Texture, texture};
+use gltf::json::{Image, Index, Root, Scene, Texture};
+use serde::Deserialize;
 use serde::de::DeserializeOwned;
+use serde_json::value::RawValue;
 use serde_json::{Map, Value};
+use std::collections::HashMap;
 use std::error::Error;
+use std::fmt::Display;
 use std::ops::Deref;
 
-/// More JSON than this is not parsed: a plain value takes up to thirty times the memory of its text.
+/// More JSON than this is not parsed.
 const MOST_JSON_BYTES: usize = 512 << 20;
-
-/// Longer tables are refused: a row of two bytes takes about a kilobyte when it is parsed.
-const MOST_ROWS: usize = 1 << 22;
 
 /// An object of the file that is not parsed yet.
 type Row = Map<String, Value>;
@@ -46,92 +52,88 @@ impl Deref for Document {
 }
 
 impl Document {
-    pub(super) fn parse(json: &[u8]) -> Result<Document, Fault> {
-        if json.len() > MOST_JSON_BYTES {
-            let problem = format!("{} bytes of JSON are more than can be read", json.len());
-            return Err(Fault::new("JSON", problem).remedy("keep binary data in buffers"));
-        }
-        let marks: [&[u8]; 3] = [b"\xEF\xBB\xBF", b"\xFF\xFE", b"\xFE\xFF"];
-        if marks.iter().any(|mark| json.starts_with(mark)) {
-            return Err(Fault::new("JSON", "starts with a byte order mark")
-                .remedy("save the file as UTF-8 without one"));
-        }
-        let json: Value = serde_json::from_slice(json)
+    /// Parses the JSON table by table and row by row, so that no more than a row is in memory twice. A row
+    /// that is not what it should be is left out: an empty one takes its place and its number.
+    pub(super) fn parse(
+        json: &[u8],
+        budget: &mut Budget,
+        notes: &mut Notes,
+    ) -> Result<Document, Fault> {
+        let json = text(json, notes)?;
+        let members = serde_json::from_slice(json)
             .map_err(|error| Fault::new("JSON", format!("cannot be parsed: {error}")))?;
-        let Value::Object(mut json) = json else {
-            return Err(Fault::new("JSON", "is not an object"));
-        };
-        let asset = json.remove("asset").ok_or_else(|| Fault::new("asset", "is missing"))?;
-        let mut extensions: Row = optional(&mut json, "extensions")?.unwrap_or_default();
-        let lights = match optional::<Row>(&mut extensions, "KHR_lights_punctual")? {
-            Some(mut punctual) if punctual.contains_key("lights") => {
-                table(&mut punctual, "lights", "light", beside::light)?
+        let mut tables = Tables { members, budget, notes };
+        let mut beside = Beside::default();
+        let asset = match tables.members.remove("asset") {
+            Some(asset) => typed(asset, "asset")?,
+            None => {
+                tables.notes.add(Category::Other, "asset", "is missing; read as glTF 2.0");
+                Asset { version: "2.0".into(), ..Asset::default() }
             }
-            Some(_) => return Err(Fault::new("KHR_lights_punctual", "has no list of lights")),
-            None => Vec::new(),
         };
-        let (json, mut beside) = (&mut json, Beside::default());
+        let lights = Kind("light", Category::Lights, r#"{"type": "point", "intensity": 0}"#);
+        let lights = tables
+            .within("extensions", "KHR_lights_punctual")?
+            .map_or(Ok(Vec::new()), |mut punctual| {
+                punctual.table("lights", &lights, |row, _| beside::light(row))
+            })?;
+        // Whether what is left out would emit is not known.
+        let node = Kind("node", Category::Lights, "{}");
+        let mesh = Kind("mesh", Category::Lights, r#"{"primitives": []}"#);
+        let accessor = Kind(
+            "accessor",
+            Category::Geometry,
+            r#"{"componentType": 0, "count": 0, "type": "?"}"#,
+        );
+        let view = Kind("buffer view", Category::Geometry, r#"{"buffer": 0, "byteLength": 0}"#);
+        let buffer = Kind("buffer", Category::Geometry, r#"{"byteLength": 0}"#);
+        let material = Kind("material", Category::Lights, "{}");
+        let texture = Kind("texture", Category::Materials, "{}");
+        let image = Kind("image", Category::Materials, "{}");
+        let sampler = Kind("sampler", Category::Materials, "{}");
+        let camera = Kind("camera", Category::Cameras, r#"{"type": "none"}"#);
+        let animation =
+            Kind("animation", Category::Animation, r#"{"channels": [], "samplers": []}"#);
+        let scene = Kind("scene", Category::Geometry, r#"{"nodes": []}"#);
+        let plain = |_: &mut Row, _| Ok(());
         let root = Root {
-            asset: typed(asset, "asset")?,
-            extensions_used: optional(json, "extensionsUsed")?.unwrap_or_default(),
-            extensions_required: optional(json, "extensionsRequired")?.unwrap_or_default(),
+            asset,
+            extensions_used: tables.optional("extensionsUsed")?.unwrap_or_default(),
+            extensions_required: tables.optional("extensionsRequired")?.unwrap_or_default(),
             extensions: Some(RootExtensions {
                 khr_lights_punctual: Some(KhrLightsPunctual { lights }),
                 ..RootExtensions::default()
             }),
-            scene: optional(json, "scene")?.map(Index::new),
-            scenes: table(json, "scenes", "scene", beside::scene)?,
-            nodes: table(json, "nodes", "node", |row| beside.node(row))?,
-            meshes: table(json, "meshes", "mesh", beside::mesh)?,
-            accessors: table(json, "accessors", "accessor", beside::accessor)?,
-            buffer_views: table(json, "bufferViews", "buffer view", |_| Ok(()))?,
-            buffers: table(json, "buffers", "buffer", |_| Ok(()))?,
-            materials: table(json, "materials", "material", |row| beside.material(row))?,
-            textures: table(json, "textures", "texture", |_| Ok(()))?,
-            images: table(json, "images", "image", |_| Ok(()))?,
-            samplers: table(json, "samplers", "sampler", |_| Ok(()))?,
-            cameras: table(json, "cameras", "camera", |row| beside.camera(row))?,
-            animations: table(json, "animations", "animation", |row| beside.animation(row))?,
-            skins: table(json, "skins", "skin", |_| Ok(()))?,
+            scene: tables.optional("scene")?.map(Index::new),
+            scenes: tables.table("scenes", &scene, |row, _| beside::scene(row))?,
+            nodes: tables.table("nodes", &node, |row, i| beside.node(row, i))?,
+            meshes: tables.table("meshes", &mesh, |row, _| beside::mesh(row))?,
+            accessors: tables.table("accessors", &accessor, |row, _| beside::accessor(row))?,
+            buffer_views: tables.table("bufferViews", &view, plain)?,
+            buffers: tables.table("buffers", &buffer, plain)?,
+            materials: tables.table("materials", &material, |row, i| beside.material(row, i))?,
+            textures: tables.table("textures", &texture, plain)?,
+            images: tables.table("images", &image, plain)?,
+            samplers: tables.table("samplers", &sampler, plain)?,
+            cameras: tables.table("cameras", &camera, |row, i| beside.camera(row, i))?,
+            animations: tables
+                .table("animations", &animation, |row, i| beside.animation(row, i))?,
             ..Root::default()
         };
         Ok(Document { root, beside })
     }
 
-    /// `KHR_lights_punctual`.
-    pub(super) fn lights(&self) -> &[Light] {
-        self.as_ref()
+    /// The scene that is read, and its number: the default if it is there, else the first.
+    pub(super) fn default_scene(&self) -> Option<(usize, &Scene)> {
+        let wanted = self.scene.map_or(0, |scene| scene.value());
+        let number = if wanted < self.scenes.len() { wanted } else { 0 };
+        Some((number, self.scenes.get(number)?))
     }
 
     /// The light at a node.
     pub(super) fn light_at(&self, node: usize) -> Option<Index<Light>> {
         let extensions = self.nodes[node].extensions.as_ref()?;
         extensions.khr_lights_punctual.as_ref().map(|punctual| punctual.light)
-    }
-
-    /// Every use of a texture by a material, read or not, but for its occlusion map.
-    pub(super) fn texture_uses(&self, material: usize) -> impl Iterator<Item = &texture::Info> {
-        let (row, normal) = (&self.materials[material], &self.beside.normal_maps[material]);
-        let pbr = &row.pbr_metallic_roughness;
-        let extensions = row.extensions.as_ref();
-        let specular = extensions.and_then(|extensions| extensions.specular.as_ref());
-        let glossy = extensions.and_then(|extensions| extensions.pbr_specular_glossiness.as_ref());
-        let core = [
-            normal,
-            &row.emissive_texture,
-            &pbr.base_color_texture,
-            &pbr.metallic_roughness_texture,
-        ];
-        core.into_iter()
-            .chain(
-                specular.into_iter().flat_map(|s| [&s.specular_texture, &s.specular_color_texture]),
-            )
-            .chain(
-                glossy
-                    .into_iter()
-                    .flat_map(|g| [&g.diffuse_texture, &g.specular_glossiness_texture]),
-            )
-            .flatten()
     }
 }
 
@@ -145,36 +147,120 @@ pub(super) fn morph_targets(primitive: &Primitive) -> usize {
     primitive.targets.as_ref().map_or(0, Vec::len)
 }
 
-fn typed<T: DeserializeOwned>(value: Value, object: &str) -> Result<T, Fault> {
-    T::deserialize(value).map_err(|error| Fault::new(object, error))
+/// What kind of object a table holds: its name, what notes about it are about, and the JSON of an object
+/// that stands for one that was left out.
+struct Kind(&'static str, Category, &'static str);
+
+/// The members of a JSON object that are not parsed yet.
+struct Tables<'a, 'n> {
+    members: HashMap<String, &'a RawValue>,
+    budget: &'n mut Budget,
+    notes: &'n mut Notes,
 }
 
-fn optional<T: DeserializeOwned>(json: &mut Row, key: &str) -> Result<Option<T>, Fault> {
-    json.remove(key).map(|value| typed(value, key)).transpose()
-}
-
-/// Parses a table row by row, each after it has been prepared.
-fn table<T: DeserializeOwned>(
-    json: &mut Row,
-    key: &str,
-    kind: &str,
-    mut prepare: impl FnMut(&mut Row) -> Result<(), Box<dyn Error>>,
-) -> Result<Vec<T>, Fault> {
-    let rows: Vec<Value> = optional(json, key)?.unwrap_or_default();
-    if rows.len() > MOST_ROWS {
-        let problem = format!("{} of them are more than the {MOST_ROWS} that are read", rows.len());
-        return Err(Fault::new(key, problem).remedy("divide the scene"));
-    }
-    let row = |(i, mut value): (usize, Value)| {
-        let object = label(kind, i, value.get("name").and_then(Value::as_str));
-        let Some(row) = value.as_object_mut() else {
-            return Err(Fault::new(object, "is not an object"));
+impl<'a> Tables<'a, '_> {
+    /// The members of an object inside an object.
+    fn within(&mut self, outer: &str, inner: &str) -> Result<Option<Tables<'a, '_>>, Fault> {
+        let Some(outer_members) = self.optional::<HashMap<String, &RawValue>>(outer)? else {
+            return Ok(None);
         };
-        reference::check(row).map_err(|problem| Fault::new(&object, problem))?;
-        prepare(row).map_err(|problem| Fault::new(&object, problem))?;
-        typed(value, &object)
-    };
-    rows.into_iter().enumerate().map(row).collect()
+        let Some(inner) = outer_members.get(inner) else { return Ok(None) };
+        let members = typed(inner, outer)?;
+        Ok(Some(Tables { members, budget: self.budget, notes: self.notes }))
+    }
+
+    fn optional<T: Deserialize<'a>>(&mut self, key: &str) -> Result<Option<T>, Fault> {
+        self.members.remove(key).map(|json| typed(json, key)).transpose()
+    }
+
+    /// Parses a table row by row, each after it has been prepared.
+    fn table<T: DeserializeOwned>(
+        &mut self,
+        key: &str,
+        kind: &Kind,
+        mut prepare: impl FnMut(&mut Row, usize) -> Result<(), Box<dyn Error>>,
+    ) -> Result<Vec<T>, Fault> {
+        let Kind(name, category, spare) = *kind;
+        let rows: Vec<&RawValue> = match self.optional(key) {
+            Ok(rows) => rows.unwrap_or_default(),
+            Err(fault) => {
+                let text = format!("{}; all are left out", fault.into_problem());
+                self.notes.add(category, key, text);
+                return Ok(Vec::new());
+            }
+        };
+        let text: u64 = rows.iter().map(|row| weight(row.get())).sum();
+        self.budget.take(text + (rows.len() * size_of::<T>()) as u64, || key.to_string())?;
+        let mut parse = |json: &str, i: usize| -> Result<T, Fault> {
+            let mut value: Value =
+                serde_json::from_str(json).map_err(|e| Fault::new(label(name, i, None), e))?;
+            let own = value.get("name").and_then(Value::as_str).map(String::from);
+            let fault = |problem: &dyn Display| Fault::new(label(name, i, own.as_deref()), problem);
+            let row = value.as_object_mut().ok_or_else(|| fault(&"is not an object"))?;
+            reference::check(row).map_err(|problem| fault(&problem))?;
+            prepare(row, i).map_err(|problem| fault(&problem))?;
+            T::deserialize(value).map_err(|error| fault(&error))
+        };
+        let mut parsed = Vec::with_capacity(rows.len());
+        for (i, row) in rows.into_iter().enumerate() {
+            let row = match parse(row.get(), i) {
+                Ok(row) => row,
+                Err(fault) => {
+                    let (object, problem) = fault.parts();
+                    self.notes.add(category, object, format!("{problem}; left out"));
+                    parse(spare, i)?
+                }
+            };
+            parsed.push(row);
+        }
+        Ok(parsed)
+    }
+}
+
+/// The text of the JSON, without what some writers put before and after it.
+fn text<'a>(json: &'a [u8], notes: &mut Notes) -> Result<&'a [u8], Fault> {
+    if json.len() > MOST_JSON_BYTES {
+        let problem = format!("{} bytes of JSON are more than can be read", json.len());
+        return Err(Fault::new("JSON", problem).remedy("keep binary data in buffers"));
+    }
+    if json.starts_with(b"\xFF\xFE") || json.starts_with(b"\xFE\xFF") {
+        return Err(Fault::new("JSON", "is UTF-16").remedy("save the file as UTF-8"));
+    }
+    let text = json.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(json);
+    if text.len() < json.len() {
+        notes.add(Category::Other, "JSON", "starts with a byte order mark");
+    }
+    let end = text.iter().rposition(|&byte| byte != 0).map_or(0, |last| last + 1);
+    if end < text.len() {
+        notes.add(Category::Other, "JSON", "is padded with zero bytes and not with spaces");
+    }
+    let text = text[..end].trim_ascii();
+    match text.first() {
+        Some(b'{') | None => Ok(text),
+        Some(_) => Err(Fault::new("JSON", "is not an object")),
+    }
+}
+
+/// How many bytes of memory the JSON of a row takes at most while and after it is parsed: maps have room
+/// for eleven members, lists for four.
+fn weight(json: &str) -> u64 {
+    const MAP: u64 = (11 * (size_of::<String>() + size_of::<Value>()) + 16) as u64;
+    const LIST: u64 = 4 * size_of::<Value>() as u64;
+    let bytes = json.bytes().map(|byte| match byte {
+        b'{' => MAP,
+        b'[' => LIST,
+        b',' | b':' => LIST / 2,
+        _ => 1,
+    });
+    bytes.sum()
+}
+
+fn typed<'a, T: Deserialize<'a>>(json: &'a RawValue, object: &str) -> Result<T, Fault> {
+    serde_json::from_str(json.get()).map_err(|error| {
+        // The place that it tells is not one of the file.
+        let error = error.to_string();
+        Fault::new(object, error.split(" at line ").next().unwrap_or_default())
+    })
 }
 
 /// What a message calls an object: `node 3 "lamp"`.

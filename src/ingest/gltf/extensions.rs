@@ -1,11 +1,15 @@
 //! The version of the format, and the extensions that a file cannot be read without.
 
+use super::document::Document;
 use crate::ingest::error::Fault;
-use crate::ingest::gltf::document::Document;
+use crate::ingest::notes::Notes;
+use crate::scene::Category;
 
 /// Extensions that may be required: read in full, or where the scene is still true without them.
-const READ: [&str; 21] = [
+const READ: [&str; 25] = [
     "EXT_mesh_gpu_instancing",
+    "EXT_texture_avif",
+    "EXT_texture_webp",
     "KHR_animation_pointer",
     "KHR_lights_punctual",
     "KHR_materials_anisotropy",
@@ -24,11 +28,17 @@ const READ: [&str; 21] = [
     "KHR_materials_volume",
     "KHR_mesh_quantization",
     "KHR_node_visibility",
+    "KHR_texture_basisu",
     "KHR_texture_transform",
     "KHR_xmp_json_ld",
+    "MSFT_texture_dds",
 ];
 
-pub(super) fn check(document: &Document) -> Result<(), Fault> {
+/// Extensions that light a whole scene and are not read.
+const LIGHTS: [&str; 3] = ["EXT_lights_area", "EXT_lights_ies", "EXT_lights_image_based"];
+
+/// Refuses other versions and required extensions; notes what changes a picture and is told nowhere else.
+pub(super) fn check(document: &Document, notes: &mut Notes) -> Result<(), Fault> {
     let asset = &document.asset;
     let version = asset.min_version.as_ref().unwrap_or(&asset.version);
     let supported = match asset.min_version {
@@ -42,7 +52,12 @@ pub(super) fn check(document: &Document) -> Result<(), Fault> {
     for required in &document.extensions_required {
         if !READ.contains(&required.as_str()) {
             return Err(Fault::new("extensionsRequired", format!("{required} is not supported"))
-                .remedy("export without it; compressed meshes and textures must be unpacked"));
+                .remedy("export without it; compressed meshes must be unpacked"));
+        }
+    }
+    for extension in &document.extensions_used {
+        if LIGHTS.contains(&extension.as_str()) {
+            notes.add(Category::Lights, "file", format!("{extension} is not read"));
         }
     }
     Ok(())
