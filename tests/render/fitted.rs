@@ -5,7 +5,7 @@ use candelabra::pipeline::{self, ASPECT, View};
 use candelabra::render::RenderSettings;
 use candelabra::render::buffers::RenderBuffers;
 use candelabra::scene::{
-    Camera, Channel, Interpolation, Keys, LightKind, Mesh, Pose, Projection, Scene, Trs,
+    Camera, Channel, Interpolation, Keys, LightKind, Mesh, Pose, Projection, Scene, Trs, Visibility,
 };
 use glam::{DQuat, DVec3, Vec3};
 
@@ -237,6 +237,19 @@ fn rooms_are_seen_where_they_are_lit() {
             assert!(share > 0.3, "wall {open} is open, {facets} facets: {share} of it is lit");
         }
     }
+}
+
+/// What the camera does not see is neither framed nor in the way.
+#[test]
+fn what_is_hidden_from_the_camera_decides_nothing() {
+    let mut stage = cube_stage(1.0, DVec3::ZERO, &[]);
+    let hidden = Visibility { camera: false, ..Visibility::ALL };
+    for (side, size) in [(DVec3::Z, 5.0), (DVec3::X, 5.0), (DVec3::Y, 5.0), (-DVec3::X, 5.0)] {
+        let place = facing(side * 1.5, DVec3::ZERO);
+        stage.quad([size; 2], lambert(Vec3::ONE), place).visibility = hidden;
+    }
+    lamp(&mut stage, DVec3::new(0.3, 0.6, 1.2));
+    assert_framed("a cube behind hidden cards", &mut stage.scene, &corners(1.0, DVec3::ZERO));
 }
 
 /// A view that is good for a whole shot, whichever frames of it a process renders.

@@ -59,7 +59,8 @@ pub(super) fn fit(scene: &Scene, aspect: f64, yfov_rad: Option<f64>) -> Fitted {
     let sketch = Sketch::of(scene, &subject);
     let outside = yfov_rad.unwrap_or(YFOV_DEG.to_radians());
     let mut sights = sight::around(&subject, outside, aspect);
-    if yfov_rad.is_none() {
+    // What no light reaches anywhere looks more like a thing from outside than like a room.
+    if yfov_rad.is_none() && sketch.has_light() {
         sights.extend(sight::inside(&subject, YFOV_INSIDE_DEG.to_radians(), aspect));
     }
     let score = |sight: &Sight| sight.liking * sketch.seen_from(sight);

@@ -40,6 +40,7 @@ pub(super) struct Sketch {
     samples: Vec<Sample>,
     /// By sample, whether its front and its back are lit.
     lit: Vec<[bool; 2]>,
+    has_light: bool,
 }
 
 /// A point of a surface, world space.
@@ -51,6 +52,8 @@ struct Sample {
     reach_m: f32,
     /// Whether the front and the back shine.
     shines: [bool; 2],
+    /// Whether the camera sees it.
+    is_visible: bool,
 }
 
 /// A light that may reach a sample.
@@ -79,9 +82,15 @@ impl Sketch {
             pose: sketched_pose,
             samples,
             lit: Vec::new(),
+            has_light: !lamps.is_empty(),
         };
         sketch.lit = sketch.light(&lamps);
         sketch
+    }
+
+    /// Whether the scene has a light.
+    pub fn has_light(&self) -> bool {
+        self.has_light
     }
 
     /// The share of the surface that a view sees, of lit surface mostly; 0 to 1.
@@ -91,6 +100,9 @@ impl Sketch {
         let [right, up] = axes(back);
         let eye = sight.from.as_vec3();
         let worth = |(sample, lit): (&Sample, &[bool; 2])| {
+            if !sample.is_visible {
+                return 0.0;
+            }
             let to = sample.point.as_dvec3() - sight.from;
             let depth = -to.dot(back);
             let is_inside = to.dot(right).abs() <= depth * sight.slope.x
@@ -248,8 +260,11 @@ impl<'a> Drawing<'a> {
             normal: if is_mirrored { -normal } else { normal },
             reach_m: half_side * SQRT_2,
             shines: [shines, shines && material.is_some_and(|material| material.double_sided)],
+            is_visible: instance.visibility.camera,
         };
-        let is_opaque = material.is_none_or(|m| m.alpha_mode == AlphaMode::Opaque);
+        // What the camera does not see is in the way of no view.
+        let is_opaque = sample.is_visible
+            && material.is_none_or(|material| material.alpha_mode == AlphaMode::Opaque);
         let is_coarse = 0.5 * across.length() >= share_m2;
         // A square that stands for much of a ground must not cut through what stands on it.
         let is_rough = || {

@@ -126,8 +126,9 @@ fn choose(scene: &Scene, moment: f64, boxes: &[Aabb], lamps: &[Aabb]) -> (Vec<bo
     // What is scaled to a point, to hide it, cannot be seen.
     let is_seen = |row: &usize| boxes[*row].extent().max_element() > 0.0;
     let emits = |row: &usize| scene.peak_rgb_of_instance(*row as u32).max_element() > 0.0;
-    let (mut lit, plain): (Vec<usize>, Vec<usize>) =
+    let (mut lit, mut plain): (Vec<usize>, Vec<usize>) =
         (0..boxes.len()).filter(is_seen).partition(emits);
+    plain.retain(|&row| scene.instances[row].visibility.camera);
     // Meshes that shine are lights, unless there is nothing else.
     let plain = if plain.is_empty() { std::mem::take(&mut lit) } else { plain };
     let pose = scene.pose_at(moment);
