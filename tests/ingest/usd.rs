@@ -2,7 +2,7 @@
 
 use crate::files;
 use crate::files::{File, lamp};
-use candelabra::scene::{LightKind, Pixels, Scene, Shaping, Timeline};
+use candelabra::scene::{LightKind, Pixels, Scene, Shaping, Timeline, Visibility};
 use glam::Vec3;
 use serde_json::json;
 use std::f32::consts::{FRAC_PI_3, FRAC_PI_6};
@@ -114,7 +114,8 @@ fn who_meets_a_light_follows_from_its_type_and_what_it_says() {
     assert_eq!(load(|_| ()).instances[0].visibility, Visibility::ALL);
     let seen = json!({"type": "RectLight", "visibility": {"camera": true}});
     assert_eq!(of(seen), Visibility { camera: true, ..Visibility::LAMP });
-    let hidden = json!({"type": "MeshLight", "visibility": {"reflections": false, "shadows": false}});
+    let hidden =
+        json!({"type": "MeshLight", "visibility": {"reflections": false, "shadows": false}});
     let camera_alone = Visibility { camera: true, reflections: false, shadows: false };
     assert_eq!(of(hidden), camera_alone);
     let dome = json!({"type": "DomeLight", "visibility": {"camera": false}});
