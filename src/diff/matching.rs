@@ -47,7 +47,7 @@ pub(super) fn matching(before: &[Light], after: &[Light]) -> Matching {
 
     let families = Families::of(lists, &left);
     let (numbered, left) = divide(lists, left, &families);
-    let (pairs, numbered) = join_families(lists, numbered, |light| Some(light.fingerprint));
+    let (pairs, numbered) = join_families(lists, numbered, |light| light.fingerprint);
     same.extend(pairs);
     let (pairs, left) = join(left, by_path);
     same.extend(pairs);
@@ -56,7 +56,7 @@ pub(super) fn matching(before: &[Light], after: &[Light]) -> Matching {
     a.extend(numbered[1].iter().map(|row| row.0));
     let (mut renamed, left) = join([b, a], by_content);
     let (numbered, [mut b, mut a]) = divide(lists, left, &families);
-    let (pairs, numbered) = join_families(lists, numbered, |_| None);
+    let (pairs, numbered) = join_families(lists, numbered, |_| ());
     same.extend(pairs);
     b.extend(numbered[0].iter().map(|row| row.0));
     a.extend(numbered[1].iter().map(|row| row.0));

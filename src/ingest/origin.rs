@@ -14,7 +14,7 @@ use glam::{DVec3, Vec3};
 /// from its origin than about that, and no scene nearer than half of it has another than 0.
 const REACHES: f64 = 256.0;
 /// A note is due if rounding a position may move it by more than this share of a prim's size.
-const NOTED: f64 = 1e-3;
+const NOTED: f64 = 1e-2;
 
 /// Something that stands somewhere.
 struct Thing {

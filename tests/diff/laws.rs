@@ -2,8 +2,8 @@
 
 use crate::street::{SPHERE, diff, node, only, put, street, tree_of, with_camera};
 use candelabra::diff::{Change, Diff, DiffOptions, Difference, ProbePlaces, Side, Verb, compare};
-use candelabra::scene::{Channel, Interpolation, Keys, Light, LightKind, Scene};
-use glam::Vec3;
+use candelabra::scene::{Channel, Interpolation, Keys, Light, LightKind, Scene, Trs};
+use glam::{DVec3, Vec3};
 use proptest::prelude::*;
 use tempfile::TempDir;
 
@@ -276,4 +276,45 @@ fn a_tree_and_its_scene_are_the_same_and_two_trees_as_two_scenes() {
     *intensity_cd = Vec3::ZERO;
     let found = compare(&trees[0], &Side::of_scene(off));
     assert_eq!(only(&found).verb, Verb::Removed);
+}
+
+#[test]
+fn places_are_those_of_the_world_wherever_the_origin_is() {
+    const FAR: f64 = 1_048_576.0;
+    let far = |origin: f64, raised: f64| {
+        let mut scene = street();
+        for node in &mut scene.nodes {
+            let Trs::Parts { translation, .. } = &mut node.local else { panic!() };
+            translation.x += FAR;
+            translation.y += if node.path.ends_with("point") { raised } else { 0.0 };
+        }
+        scene.origin = DVec3::X * origin;
+        scene
+    };
+    let folder = TempDir::new().unwrap();
+    for other in [FAR, FAR + 512.0] {
+        let scenes = || [far(FAR, 0.0), far(other, 0.5)];
+        let [before, after] = scenes();
+        let trees =
+            [tree_of(&before, &folder, "before.ltree"), tree_of(&after, &folder, "after.ltree")];
+        let of_trees = compare(&trees[0], &trees[1], &DiffOptions::default()).unwrap();
+        for found in [diff(before, after), of_trees] {
+            let change = found.changes.iter().find(|c| c.path() == "/street/point").unwrap();
+            if other == FAR {
+                only(&found);
+                assert_eq!(
+                    (f64::from(found.picking.as_ref().unwrap().worst_at_m[0]) / FAR).round(),
+                    1.0
+                );
+            }
+            let moved = change.differences.iter().find_map(|difference| match difference {
+                Difference::Transform { moved_m, .. } => Some(*moved_m),
+                _ => None,
+            });
+            assert!((moved.unwrap() - 0.5).abs() < 1e-3, "{moved:?}");
+            for card in [&change.before, &change.after].into_iter().flatten() {
+                assert_eq!(card.place.unwrap().center_m[0], FAR as f32);
+            }
+        }
+    }
 }

@@ -132,25 +132,22 @@ fn lights_in_one_place_give_the_light_of_all() {
 
 #[test]
 fn a_light_flush_with_a_ceiling_gives_its_light_whatever_comes_first() {
-    let ceiling = |stage: &mut Stage, place| {
-        stage.quad([6.0, 6.0], lambert(Vec3::ZERO), place);
-    };
-    let lamp = |stage: &mut Stage, place| {
-        stage.quad([1.0, 1.0], glow(Vec3::ONE), place);
-    };
-    for tilt in [0.0, 0.4] {
+    let lit = |parts: &[(f32, Vec3)], tilt: f64| {
         let place = facing([0.0, 1.0, 0.0], [tilt, 0.0, 0.3 * tilt]);
-        let lit = |parts: &[&dyn Fn(&mut Stage, candelabra::scene::Trs)]| {
-            let mut stage = Stage::default();
-            stage.look([0.0, 0.5, 1.0], [0.0, 0.0, 0.0], 0.5);
-            let glossy = Material { metallic: 1.0, roughness: 0.4, ..lambert(Vec3::splat(0.9)) };
-            stage.quad([6.0, 6.0], glossy, facing([0.0; 3], [0.0, 1.0, 0.0]));
-            parts.iter().for_each(|part| part(&mut stage, place));
-            Estimate::of_picture(&stage.render(&direct(SIZE, 512))).mean.x
-        };
-        let alone = lit(&[&lamp]);
-        for parts in [[&ceiling as &dyn Fn(&mut Stage, _), &lamp], [&lamp, &ceiling]] {
-            let flush = lit(&parts);
+        let mut stage = Stage::default();
+        stage.look([0.0, 0.5, 1.0], [0.0, 0.0, 0.0], 0.5);
+        let glossy = Material { metallic: 1.0, roughness: 0.4, ..lambert(Vec3::splat(0.9)) };
+        stage.quad([6.0, 6.0], glossy, facing([0.0; 3], [0.0, 1.0, 0.0]));
+        for &(size, nits) in parts {
+            stage.quad([size, size], glow(nits), place);
+        }
+        Estimate::of_picture(&stage.render(&direct(SIZE, 512))).mean.x
+    };
+    let (ceiling, lamp) = ((6.0, Vec3::ZERO), (1.0, Vec3::ONE));
+    for tilt in [0.0, 0.4] {
+        let alone = lit(&[lamp], tilt);
+        for parts in [[ceiling, lamp], [lamp, ceiling]] {
+            let flush = lit(&parts, tilt);
             assert!((flush / alone - 1.0).abs() < 0.005, "{tilt}: {flush} {alone}");
         }
     }
