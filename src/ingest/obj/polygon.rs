@@ -14,14 +14,16 @@ const ROUNDING: f64 = 1e-7;
 /// By this share may the area of all triangles differ from that of a face that does not cross itself.
 const SLACK: f64 = 1e-6;
 
-/// A face of more corners that is no fan is not cut by ears: where it crosses itself that takes as long as
-/// the square of their number, or longer.
-const MOST_CORNERS: usize = 1 << 14;
+/// A face that crosses itself takes time like the square of its corners. A file may have so many squares (one
+/// face of 16,384 corners), and more for every corner of a face: what is beyond is not cut by ears.
+const MOST_SQUARES: u64 = 1 << 28;
+const SQUARES_A_CORNER: u64 = 1 << 7;
 
 /// Cuts faces, and keeps its memory for the next.
 pub(super) struct Cutter {
     earcut: Earcut<f64>,
     ears: Vec<u32>,
+    squares_left: u64,
 }
 
 /// Whether the triangles are what the face is.
@@ -34,7 +36,14 @@ pub(super) enum Cut {
 
 impl Cutter {
     pub(super) fn new() -> Cutter {
-        Cutter { earcut: Earcut::new(), ears: Vec::new() }
+        Cutter { earcut: Earcut::new(), ears: Vec::new(), squares_left: MOST_SQUARES }
+    }
+
+    fn has_time_for(&mut self, corners: u64) -> bool {
+        self.squares_left = self.squares_left.saturating_add(SQUARES_A_CORNER * corners);
+        let left = corners.checked_mul(corners).and_then(|sq| self.squares_left.checked_sub(sq));
+        self.squares_left = left.unwrap_or(self.squares_left);
+        left.is_some()
     }
 
     /// Calls back with the triangles of a face whose corners are finite, as numbers of its corners.
@@ -52,7 +61,7 @@ impl Cutter {
         let normal = twice_area / whole;
         let is_fan = whole > 0.0 && fan().all(|part| part.dot(normal) >= -ROUNDING * whole);
         let has_area = fan().any(|part| part != DVec3::ZERO);
-        if is_fan || !has_area || whole == 0.0 || corners.len() > MOST_CORNERS {
+        if is_fan || !has_area || whole == 0.0 || !self.has_time_for(corners.len() as u64) {
             (1..count - 1).for_each(|i| triangle([0, i, i + 1]));
             return if is_fan || !has_area { Cut::Whole } else { Cut::Approximate };
         }
@@ -155,7 +164,7 @@ mod tests {
             state = state.wrapping_mul(1664525).wrapping_add(1013904223);
             (state >> 8) as f32 / (1 << 24) as f32
         };
-        for count in [MOST_CORNERS, 1_000_000] {
+        for (count, faces) in [(1 << 10, 300), (1_000_000, 1)] {
             let tangle: Vec<Vec3> =
                 (0..count).map(|_| Vec3::new(random(), random(), 0.0)).collect();
             let comb: Vec<Vec3> = (0..count)
@@ -163,9 +172,12 @@ mod tests {
                 .chain([Vec3::new(count as f32, 2.0, 0.0), Vec3::new(0.0, 2.0, 0.0)])
                 .collect();
             for face in [tangle, comb] {
-                let started = Instant::now();
-                triangles_of(&face);
-                assert!(started.elapsed().as_secs() < 10, "{count} corners");
+                let (mut cutter, started) = (Cutter::new(), Instant::now());
+                for _ in 0..faces {
+                    cutter.cut(&face, |_| {});
+                }
+                let seconds = started.elapsed().as_secs_f64();
+                assert!(seconds < 60.0, "{faces} faces of {count} corners: {seconds} s");
             }
         }
     }
