@@ -76,10 +76,17 @@ fn transforms_are_read_as_they_are() {
 fn large_translations_keep_their_small_part() {
     let mut file = lamp();
     file.json["nodes"][0]["translation"] = json!([1e9 + 0.125, 0, 0]);
+    // What stands out there is counted from an origin out there.
+    let scene = file.load().unwrap();
+    let place = scene.pose_at(0.0).world(0).translation.as_dvec3() + scene.origin;
+    assert_eq!(place, DVec3::new(1e9 + 0.125, 0.0, 0.0));
+    // What a child takes back is taken back exactly.
     file.json["nodes"][0]["children"] = json!([1]);
-    file.add("nodes", json!({"translation": [-1e9, 0, 0]}));
-    let world = file.load().unwrap().pose_at(0.0).world(1);
-    assert_eq!(world.translation, Vec3::new(0.125, 0.0, 0.0).into());
+    file.json["nodes"][0].as_object_mut().unwrap().remove("mesh");
+    file.add("nodes", json!({"mesh": 0, "translation": [-1e9, 0, 0]}));
+    let scene = file.load().unwrap();
+    assert_eq!(scene.origin, DVec3::ZERO);
+    assert_eq!(scene.pose_at(0.0).world(1).translation, Vec3::new(0.125, 0.0, 0.0).into());
 }
 
 #[test]
