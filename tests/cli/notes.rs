@@ -22,7 +22,7 @@ fn noted() -> Shot {
 const TOLD: [&str; 3] = [
     "lights: light 0: is of an unknown type",
     "gone.png",
-    "cameras: node 0 \"wall\": the field of view",
+    "cameras: node 0 \"wall\": its camera's vertical field of view",
 ];
 
 /// Asserts that standard error has a line with each text.

@@ -1,7 +1,7 @@
 //! What is broken and can be read safely: mended or left out, with one note that names it.
 
 use crate::files::{File, lamp, png};
-use candelabra::scene::{Category, LightKind, Scene, Shaping, Trs};
+use candelabra::scene::{Category, LightKind, Projection, Scene, Shaping, Trs};
 use glam::DVec3;
 use serde_json::json;
 use std::f32::consts::FRAC_PI_4;
@@ -273,7 +273,8 @@ fn lights_and_cameras_out_of_range() {
             f.add("cameras", json!({"type": "perspective", "perspective": {"yfov": yfov}}));
             f.json["nodes"][0]["camera"] = json!(0);
         });
-        assert!(scene.cameras.is_empty());
+        let Projection::Perspective { yfov_rad } = scene.cameras[0].projection else { panic!() };
+        assert_eq!(yfov_rad, 45f32.to_radians());
     }
 }
 
@@ -295,7 +296,8 @@ fn animations_that_are_broken() {
         assert!(mends(Animation, "animation 0", text, damage).nodes[0].channels.is_empty());
     };
     let scene = mends(Animation, "animation 0", "do not ascend", |f| {
-        animate(f, &[-1.0, 1.0, 1.0, f32::NAN, 2.0], &[0.0; 15], "translation", "LINEAR");
+        let moved: Vec<f32> = (0..15).map(|i| i as f32).collect();
+        animate(f, &[-1.0, 1.0, 1.0, f32::NAN, 2.0], &moved, "translation", "LINEAR");
     });
     let candelabra::scene::Channel::Translation(keys) = &scene.nodes[0].channels[0] else {
         panic!()
@@ -326,8 +328,9 @@ fn animations_that_are_broken() {
     let scene = takes(|f| {
         animate(f, &[0.0], &[9.0, 9.0, 9.0, 1.0, 2.0, 3.0, 9.0, 9.0, 9.0], "scale", "CUBICSPLINE")
     });
-    let candelabra::scene::Channel::Scale(keys) = &scene.nodes[0].channels[0] else { panic!() };
-    assert_eq!(keys.values, [glam::Vec3::new(1.0, 2.0, 3.0)], "a spline of one key is its value");
+    let Trs::Parts { scale, .. } = scene.nodes[0].local else { panic!() };
+    assert_eq!(scale, glam::DVec3::new(1.0, 2.0, 3.0), "a spline of one key is its value");
+    assert!(scene.nodes[0].channels.is_empty(), "and holds still");
 }
 
 type Damage = Box<dyn Fn(&mut File)>;

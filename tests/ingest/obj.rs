@@ -1,10 +1,10 @@
 //! OBJ and MTL.
 
-use crate::files;
+use crate::{files, shared};
 use candelabra::ingest::{IngestError, load};
 use candelabra::scene::{AlphaMode, Category, Scene};
-use glam::{Vec2, Vec3};
-use std::path::Path;
+use glam::{DVec3, Vec2, Vec3};
+use std::path::{Path, PathBuf};
 
 const TRIANGLE: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0.25 0.25\n";
 
@@ -176,4 +176,66 @@ fn text_comes_as_it_comes() {
     let latin: Vec<u8> = body.chars().map(|c| c as u8).collect();
     std::fs::write(&path, [b"\xEF\xBB\xBF".to_vec(), latin].concat()).unwrap();
     assert_eq!(load(&path).unwrap().meshes[0].triangles, [[0, 1, 2], [0, 2, 1]]);
+}
+
+/// The number and the area of all triangles of a file, as another reader finds them.
+fn by_tobj(path: &Path) -> (usize, f64) {
+    let options = tobj::LoadOptions { triangulate: true, ..Default::default() };
+    let (models, _) = tobj::load_obj(path, &options).unwrap();
+    let triangles = models.iter().flat_map(|model| {
+        let corner = |&i: &u32| {
+            DVec3::from_slice(
+                &[0, 1, 2].map(|axis| f64::from(model.mesh.positions[3 * i as usize + axis])),
+            )
+        };
+        model
+            .mesh
+            .indices
+            .chunks_exact(3)
+            .map(move |t| [corner(&t[0]), corner(&t[1]), corner(&t[2])])
+    });
+    summed(triangles)
+}
+
+fn by_us(scene: &Scene) -> (usize, f64) {
+    let triangles = scene.instances.iter().flat_map(|instance| {
+        let mesh = &scene.meshes[instance.mesh as usize];
+        mesh.triangles.iter().map(|t| t.map(|corner| mesh.positions[corner as usize].as_dvec3()))
+    });
+    summed(triangles)
+}
+
+fn summed(triangles: impl Iterator<Item = [DVec3; 3]>) -> (usize, f64) {
+    triangles.fold((0, 0.0), |(count, area), [a, b, c]| {
+        (count + 1, area + 0.5 * (b - a).cross(c - a).length())
+    })
+}
+
+/// Of convex faces every way to cut gives the same area and as many triangles.
+#[test]
+fn another_reader_finds_the_same_surfaces() {
+    let mut text = String::from("o fans\n");
+    for face in 0..40usize {
+        let corners = 3 + face % 6;
+        for corner in 0..corners {
+            let angle = corner as f64 / corners as f64 * std::f64::consts::TAU;
+            text += &format!("v {} {} {face}\n", angle.cos(), angle.sin());
+        }
+        let named: Vec<String> = (0..corners).map(|i| format!("-{}", corners - i)).collect();
+        text += &format!("f {}\n", named.join(" "));
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("fans.obj");
+    std::fs::write(&path, text).unwrap();
+    let mut files = vec![path];
+    if let Some(folder) = shared::folder("real/stochastic_lightcuts_cornell") {
+        let is_obj = |path: &PathBuf| path.extension().is_some_and(|extension| extension == "obj");
+        files.extend(shared::files_below(&folder).into_iter().filter(is_obj));
+    }
+    for path in files {
+        let ((count, area), (wanted, exact)) =
+            (by_us(&candelabra::ingest::load(&path).unwrap()), by_tobj(&path));
+        assert_eq!(count, wanted, "{}", path.display());
+        assert!((area / exact - 1.0).abs() < 1e-6, "{area} {exact}");
+    }
 }

@@ -1,7 +1,7 @@
 //! Domes whose OpenEXR says something of its own pixels: heeded, or refused.
 
 use crate::files;
-use candelabra::scene::{Pixels, Scene};
+use candelabra::scene::{Category, Pixels, Scene};
 use exr::meta::attribute::{Chromaticities, EnvironmentMap};
 use exr::prelude::{
     AnyChannel, AnyChannels, Encoding, FlatImage, FlatSamples, Image, ImageAttributes,
@@ -96,7 +96,7 @@ fn the_display_window_is_the_picture() {
 }
 
 #[test]
-fn what_is_no_flat_picture_is_refused_by_name() {
+fn what_is_no_flat_picture_is_left_out_by_name() {
     let rgb = [("R", 1.0), ("G", 1.0), ("B", 1.0)];
     let mut cube = picture((2, 12), &rgb);
     cube.layer_data[0].attributes.environment_map = Some(EnvironmentMap::Cube);
@@ -111,7 +111,9 @@ fn what_is_no_flat_picture_is_refused_by_name() {
         (picture((4, 2), &[("beauty.R", 1.0), ("Z", 1.0)]), "its channels are Z, beauty.R"),
     ];
     for (image, problem) in cases {
-        let message = load(&image).unwrap_err();
-        assert!(message.contains(problem) && message.contains("save it"), "{message}");
+        let scene = load(&image).unwrap();
+        let note = &scene.notes[0];
+        assert!(note.text.contains(problem) && note.text.contains("left out"), "{note:?}");
+        assert!(note.category == Category::Lights && scene.lights.is_empty());
     }
 }

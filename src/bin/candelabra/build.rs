@@ -51,7 +51,6 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         rayon::ThreadPoolBuilder::new().num_threads(threads.into()).build_global()?;
     }
     let output = arguments.output.clone().unwrap_or(arguments.scene.with_extension("ltree"));
-    pipeline::check_output(&output)?;
     // An output that is there may be up to date, and need no writing.
     if !output.is_file() {
         check_writable(&output)?;
@@ -81,6 +80,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     if scene.files.iter().any(|input| real(input).is_some() && real(input) == real(&output)) {
         bail!("{}: is the scene's own file; choose another output", output.display());
     }
+    pipeline::check_output(&output)?;
     let (emitters, collecting) = timed(|| collect(&scene));
     let frames = match &arguments.frames {
         Some(frames) => {
