@@ -35,8 +35,8 @@ impl Cone {
         Cone { axis, theta_o: half_angle.min(PI) - theta_e, theta_e, two_sided: false }
     }
 
-    /// The smallest cone around two (HPG 2018, Algorithm 1). Where either is two-sided the result
-    /// is, and then the sign of an axis means nothing.
+    /// The smallest cone around two (HPG 2018, Algorithm 1). If either is two-sided, so is the result,
+    /// and the sign of an axis has no meaning.
     pub fn union(&self, other: &Cone) -> Cone {
         let (wide, narrow) =
             if self.theta_o >= other.theta_o { (self, other) } else { (other, self) };
@@ -56,8 +56,8 @@ impl Cone {
         Cone { axis, theta_o, theta_e, two_sided }
     }
 
-    /// A cone around some, about the mean of their axes. Unlike a union of one after the other it
-    /// does not depend on their order.
+    /// A cone around several, about the mean of their axes. Unlike successive unions, it does not depend
+    /// on their order.
     ///
     /// # Panics
     /// If there are none.
@@ -67,7 +67,7 @@ impl Cone {
         }
         let two_sided = cones.iter().any(|cone| cone.two_sided);
         let theta_e = cones.iter().map(|cone| cone.theta_e).fold(0.0, f32::max);
-        // The widest says which of two opposite axes is meant.
+        // If they are two-sided, the widest decides which of two opposite axes is taken.
         let widest = cones.iter().max_by(|a, b| a.theta_o.total_cmp(&b.theta_o));
         let first = widest.expect("there is a cone").axis;
         let turned = |cone: &Cone| {
@@ -96,8 +96,8 @@ impl Cone {
     }
 }
 
-/// `from` turned by `by` radians in the plane that holds both; any plane if they are opposite. In
-/// double precision: between nearly opposite axes the plane is known to few digits only.
+/// `from` turned by `by` radians in the plane that holds both; in any plane if they are opposite. In
+/// double precision, because nearly opposite axes determine the plane to a few digits only.
 fn turn_towards(from: Vec3, to: Vec3, by: f32) -> Vec3 {
     let (from, to) = (from.as_dvec3().normalize(), to.as_dvec3());
     let across = to - from * from.dot(to);

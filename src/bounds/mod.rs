@@ -28,7 +28,7 @@ pub struct LightBounds {
 }
 
 impl LightBounds {
-    /// The bounds of some together.
+    /// The bounds around several.
     ///
     /// # Panics
     /// If there are none.

@@ -5,19 +5,19 @@ use super::light::Described;
 use crate::math::angle;
 use glam::{DMat3, DVec3, Vec3};
 
-/// Cones that differ by less differ by the rounding of their axes, degrees.
+/// A smaller difference between half angles of cones is rounding of their axes, degrees.
 const LEAST_CONE_DEG: f32 = 0.05;
-/// Axes likewise, where nothing but the bounds in a tree tells them.
+/// A smaller turn of an axis is rounding where only bounds are known, degrees.
 const LEAST_TURN_DEG: f32 = 0.02;
-/// Sizes likewise: boxes in a tree have steps of 1 in 255.
+/// A smaller relative change of size is rounding: boxes in a tree have steps of 1 in 255.
 const LEAST_SCALE: f32 = 0.02;
-/// Places likewise, relative to the largest coordinate.
+/// A shorter move is rounding; relative to the largest coordinate.
 const LEAST_MOVE: f32 = 4.0 * f32::EPSILON;
-/// Energies that are summed from the leaves of another tree differ by that much without a reason.
+/// A smaller relative difference of energy is rounding if the energies were summed in different trees.
 const LEAST_ENERGY: f32 = 1e-4;
 
-/// All that differs between two versions of a light that are known to differ. Empty if only the form
-/// in which they are told does: another instance of a mesh gives it a tree of its own.
+/// All that differs between two versions of a light that are known to differ. Empty if only their
+/// representation differs: a mesh that gains another instance gets a tree of its own.
 pub(super) fn differences(
     before: &Described,
     after: &Described,
@@ -61,7 +61,7 @@ pub(super) fn differences(
     if (both_lit && a.changes != b.changes) || (a.changes && found.is_empty()) || goes_on {
         found.push(Difference::OverTime { before: a.changes, after: b.changes, apart });
     }
-    // What has become another kind has another profile.
+    // A light of another kind always has another profile, so that is not reported.
     let respread = both_lit && a.kind == b.kind && before.profile.pattern != after.profile.pattern;
     if respread || (found.is_empty() && !in_other_form) {
         found.push(Difference::Pattern);
@@ -69,7 +69,7 @@ pub(super) fn differences(
     found
 }
 
-/// Whether two versions come clearly farther apart in time than they are in the first frame.
+/// Whether two versions differ clearly more in some frame than in the first.
 fn exceeds(apart: &Apart, at_first: &[Difference]) -> bool {
     let (mut moved, mut in_stops) = (0.0, 0.0);
     for difference in at_first {
@@ -106,7 +106,7 @@ impl From<glam::Affine3A> for Placing {
 }
 
 impl Placing {
-    /// The rotation that is left of it without scale and reflection.
+    /// Its rotation, without scale and reflection.
     fn rotation(&self) -> DMat3 {
         let mirrored = self.linear.determinant() < 0.0;
         let linear = if mirrored { -self.linear } else { self.linear };
@@ -116,7 +116,8 @@ impl Placing {
     }
 }
 
-/// Where both transforms are known: how the middle moved that it had before.
+/// The difference where both transforms are known. The move is that of the point that was the light's
+/// middle before.
 fn by_matrices(before: &Described, [a, b]: [Placing; 2]) -> Difference {
     let is_near = before.card.place.is_some();
     let middle = before.card.place.map_or(DVec3::ZERO, |p| Vec3::from(p.center_m).as_dvec3());
@@ -141,7 +142,7 @@ fn by_matrices(before: &Described, [a, b]: [Placing; 2]) -> Difference {
     }
 }
 
-/// Where only bounds are known, or where the shape changed and the transform did not.
+/// The difference where only bounds are known, or where the shape changed and the transform did not.
 fn by_bounds(before: &Described, after: &Described) -> Option<Difference> {
     let (a, b) = (before.card.place?, after.card.place?);
     let moved_m = moved(a.center_m.into(), b.center_m.into());
@@ -154,7 +155,7 @@ fn by_bounds(before: &Described, after: &Described) -> Option<Difference> {
         _ => 0.0,
     };
     let turned_deg = if turned_deg < LEAST_TURN_DEG { 0.0 } else { turned_deg };
-    // The box of what turns has another shape.
+    // A turn changes the size of the box, so scale is only told without one.
     let [size_a, size_b] = [a, b].map(|place| Vec3::from(place.size_m).length());
     let scaled = if turned_deg == 0.0 && size_a > 0.0 { size_b / size_a } else { 1.0 };
     let scaled = if (scaled - 1.0).abs() < LEAST_SCALE { 1.0 } else { scaled };

@@ -22,8 +22,8 @@ pub enum Verb {
 pub struct Change {
     /// What happened to it.
     pub verb: Verb,
-    /// How much it matters, `[0, 1]`: the larger of the share of all energy that it gained or lost
-    /// and the share of all picks, in the mean over the probes, that it gained or lost.
+    /// How much it matters, `[0, 1]`: the share of all energy that it gained or lost, or the share of
+    /// all picks that it gained or lost in the mean over the probes, whichever is larger.
     pub share: f64,
     /// The light before.
     pub before: Option<LightCard>,
@@ -37,8 +37,8 @@ pub struct Change {
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(tag = "aspect", rename_all = "snake_case")]
 pub enum Difference {
-    /// Where it is. Parts that cannot be told from a tree file, such as a turn of a light that shines
-    /// to all sides, are as if they had not changed.
+    /// Where it is. A tree file does not tell everything, such as a turn of a light that shines to all
+    /// sides; what it does not tell counts as unchanged.
     Transform {
         /// How far its middle moved, metres.
         moved_m: f32,
@@ -107,8 +107,8 @@ pub enum Difference {
         /// How far apart the versions come, where it changes in both of two scenes.
         apart: Option<Apart>,
     },
-    /// How its light is spread: the texture of its emission, its profile within the cone, the shares
-    /// of its emitters. All that the other amounts do not tell.
+    /// How its emission is distributed: its texture, its profile within the cone, the shares of its
+    /// emitters. It stands for all that the other differences do not tell.
     Pattern,
 }
 

@@ -30,8 +30,8 @@ pub struct DiffOptions {
 /// Compares two versions.
 ///
 /// # Errors
-/// A scene with a light that no tree can hold; a tree that contradicts the other version, of which it
-/// says that it is the same.
+/// If a scene has a light that no tree can hold, or if a tree has the fingerprint of the other version
+/// and contradicts it.
 pub fn compare(before: &Side, after: &Side, options: &DiffOptions) -> Result<Diff, SideError> {
     let surveyed = Surveyed::both(before, after)?;
     let sides = [&surveyed[0], &surveyed[1]];
@@ -64,7 +64,7 @@ pub fn compare(before: &Side, after: &Side, options: &DiffOptions) -> Result<Dif
     let shift = (origins[1] - origins[0]).as_vec3();
     let (picking, moved) = match shift == Vec3::ZERO {
         true => compare_picking(sides, trees, lights, &pairs),
-        // No point is among the lights of both.
+        // Positions have different origins, so no probe fits both trees.
         false => (None, vec![0.0; pairs.count]),
     };
     let describer = Describer::new(scenes, trees, shift);
@@ -123,7 +123,7 @@ fn same([before, after]: [SideName; 2], tally: Tally) -> Diff {
     }
 }
 
-/// What both versions tell: a tree knows neither lights at infinity nor how lights are spread.
+/// What both versions tell: a tree holds neither infinite lights nor emission profiles.
 fn comparable<'a>(sides: [&'a Surveyed; 2], both_scenes: bool) -> [Vec<Light<'a>>; 2] {
     sides.map(|side| {
         let mut lights = side.lights();
@@ -195,8 +195,8 @@ fn strength(change: &Change) -> f32 {
 struct Weigher<'a> {
     /// Energy of the stronger version.
     total: f64,
-    /// What turns the illuminance of a light at infinity into the energy of a point light that gives
-    /// as much from the edge of the lights' box, m2.
+    /// Squared half diagonal of the box around the lights, m2. Times it, the illuminance of an infinite
+    /// light is the energy of a point light at that distance that gives the same illuminance.
     radius2: f64,
     /// By number of the light, the share of picks that it gained or lost.
     moved: &'a [f64],
@@ -217,7 +217,7 @@ impl<'a> Weigher<'a> {
         Weigher { total: energies[0].max(energies[1]), radius2, moved, apart }
     }
 
-    /// The change that a pair is; `None` if it is none, looked at closely.
+    /// The change of a pair; `None` if the descriptions of both versions do not differ.
     fn change(&self, pair: &Pair, describer: &Describer) -> Option<Change> {
         let before = pair.before.as_ref().map(|half| describer.describe(0, half));
         let after = pair.after.as_ref().map(|half| describer.describe(1, half));
@@ -239,7 +239,7 @@ impl<'a> Weigher<'a> {
         };
         let gained = (energy(&pair.after) - energy(&pair.before)).abs();
         let of_energy = if gained > 0.0 { gained / self.total } else { 0.0 };
-        // If it is the same under another name, it is other lights that it lost picks to.
+        // A light that was only renamed gains or loses picks only because other lights changed.
         let is_renamed_only = pair.verb == Verb::Renamed && differences.is_empty();
         let of_picks = if is_renamed_only { 0.0 } else { self.moved[pair.number as usize] };
         Some(Change {

@@ -1,4 +1,4 @@
-//! Both versions described from like sources, so that nothing differs but what changed.
+//! Describes both versions from the same kind of source, so that descriptions differ only by changes.
 
 use super::Mark;
 use super::light::{Described, Light};
@@ -8,8 +8,8 @@ use super::tree_side::Places;
 use crate::light_tree::LightTree;
 use glam::Vec3;
 
-/// Describes lights of either version: from the scenes if both are, else from both trees. Positions
-/// are from the origin of the version before.
+/// Describes lights of either version: from the scenes if both versions are scenes, else from both
+/// trees. Positions are relative to the origin of the version before.
 pub(super) struct Describer<'a> {
     sources: Sources<'a>,
     /// From that origin to the one of the version after.

@@ -1,26 +1,26 @@
 //! Paths that a file did not give.
 //!
 //! Names in a file may be equal or missing. Ingest then makes paths unique by the place of a prim in its
-//! file: `/lamp`, `/lamp_2`, `/lamp_3`; `/node_7`, where there is no name. Such a path identifies nothing:
-//! another order of the same prims gives each another one. The lights whose paths differ in nothing but
-//! these numbers are a *family*.
+//! file: `/lamp`, `/lamp_2`, `/lamp_3`; `/node_7`, where there is no name. Such a path does not identify
+//! a light: if the prims are reordered, their paths change. Lights whose paths differ only in these
+//! numbers are a *family*.
 
 use super::light::Light;
 use std::collections::HashSet;
 
-/// Names that ingest makes up begin so, and end in a number.
+/// The prefixes of names that ingest makes up; a number follows.
 const MADE_UP: [&str; 2] = ["node_", "object_"];
 
 /// The families of the lights of two versions.
 pub(super) struct Families<'a> {
     /// The paths of both versions, ascending.
     paths: [Vec<&'a str>; 2],
-    /// The families of which a light has a path that was numbered.
+    /// The families in which at least one light has a numbered path.
     numbered: HashSet<String>,
 }
 
 impl<'a> Families<'a> {
-    /// Of two lists of lights; the rows are those that it will be asked about.
+    /// The families of two lists of lights. `rows` are the lights that it will be asked about.
     pub fn of(lists: [&[Light<'a>]; 2], rows: &[Vec<u32>; 2]) -> Families<'a> {
         let paths = lists.map(|lights| {
             let mut paths: Vec<&str> = lights.iter().map(|light| light.path).collect();

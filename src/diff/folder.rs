@@ -63,9 +63,9 @@ impl FolderDiff {
     }
 }
 
-/// Compares all scenes and tree files (`.ltree`, `.gltf`, `.glb`, `.obj`) of two folders and of the
-/// folders in them, matched by relative path, each pair seen as by [`look_at_both`]. A shot that cannot be compared does not keep the others
-/// from it.
+/// Compares all scenes and tree files (`.ltree`, `.gltf`, `.glb`, `.obj`) of two folders and their
+/// subfolders. Files are matched by relative path, and [`look_at_both`] chooses the cameras of each pair.
+/// If a shot cannot be compared, the others still are.
 ///
 /// # Errors
 /// A folder that cannot be walked.

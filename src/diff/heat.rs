@@ -6,8 +6,9 @@ use crate::measure::direct_light;
 use crate::pipeline::ASPECT;
 use crate::render::{RenderDelegate, RenderSettings};
 
-/// A coarse picture of direct light before and after: what the first surface behind the middle of each
-/// cell reflects to the camera of all lights. Each version is seen through its own camera.
+/// A coarse picture of direct light before and after. The camera ray through the middle of each cell
+/// finds a surface; the cell tells how much light from all lights this surface reflects to the camera.
+/// Each version is seen through its own camera.
 #[derive(Clone, Debug, PartialEq)]
 pub struct HeatMap {
     /// Cells in a row.
@@ -16,7 +17,7 @@ pub struct HeatMap {
     pub height: u32,
     /// Row after row from the top left. `None` where neither version has a surface that reflects.
     pub cells: Vec<Option<HeatCell>>,
-    /// Whether what stands in a light's way was counted; else every light shines through.
+    /// Whether surfaces cast shadows; if not, light passes through everything.
     pub shadows: bool,
 }
 
@@ -39,17 +40,17 @@ impl HeatCell {
     }
 }
 
-/// Cells in a row of a map with room for all.
+/// Cells in a row, at most.
 const WIDTH: u32 = 96;
-/// Cells times emitters: what both pictures may take, seconds rather than minutes.
+/// Cells times emitters, at most, so that a map takes seconds rather than minutes.
 const MOST_LIGHTINGS: u64 = 1 << 26;
-/// The same with a ray each.
+/// Cells times emitters, at most, if each is a shadow ray.
 const MOST_RAYS: u64 = 1 << 23;
-/// Coarser than this says nothing.
+/// Cells in a row, at least, even beyond [`MOST_LIGHTINGS`]: a coarser map would tell nothing.
 const LEAST_WIDTH: u32 = 16;
 
-/// The map of two scenes, each through its camera; `None` if one has none. It is the coarser
-/// the more emitters there are.
+/// The map of two scenes, each seen through its own camera; `None` if one has no camera. The more
+/// emitters there are, the coarser the map is.
 pub(super) fn map<D: AsRef<[u8]> + Sync>(
     sides: [&SceneSide; 2],
     trees: [&LightTree<D>; 2],

@@ -22,7 +22,7 @@ pub(super) struct Infinite {
     profile: Profile,
 }
 
-/// Those of a scene, as they are in a pose; what they do in some frames is in their fingerprints.
+/// The infinite lights of a scene, as they are in `pose`. Their fingerprints cover all of `frames`.
 pub(super) fn find(scene: &Scene, pose: &Pose, frames: &[i32]) -> Vec<Infinite> {
     let shining = infinite_lights(scene, pose);
     let illuminance: HashMap<usize, f64> =
@@ -62,7 +62,8 @@ pub(super) fn find(scene: &Scene, pose: &Pose, frames: &[i32]) -> Vec<Infinite> 
     found.collect()
 }
 
-/// What the nodes of lights at infinity do that move, by node: one pose a frame for all of them.
+/// A hash of the orientations over all frames, for each moving node with an infinite light. The scene
+/// is posed once a frame for all of them.
 fn ways(scene: &Scene, frames: &[i32]) -> HashMap<u32, [u8; 32]> {
     let moving = scene.moving_nodes();
     let infinite = scene.lights.iter().filter(|light| light.kind.is_infinite());
@@ -95,7 +96,7 @@ fn profile(scene: &Scene, kind: &LightKind) -> Profile {
 }
 
 impl Infinite {
-    /// As it is matched; `row` is its place among those at infinity.
+    /// The light in the form in which it is matched. `row` is its index among the infinite lights.
     pub fn as_light<'a>(&self, scene: &'a Scene, row: u32) -> Light<'a> {
         Light {
             path: scene.light_path(self.light as usize),

@@ -1,12 +1,17 @@
 //! A comparison for programs.
 //!
-//! One JSON object on one line. `schema` is `candelabra.diff` and `version` is 1: fields may be added
-//! in it, none changes or goes. Then, of two files, what [`Diff`] holds: `before` and `after` (`file`,
-//! `is_tree`), `totals`, `picking` (or `null`) and `changes`, each with `verb`, `share`, `before` and
-//! `after` (or `null`) and `differences`, each of these with an `aspect` and its amounts. Of two
-//! folders: `before`, `after` and `shots`, each with `name`, `outcome` (`added`, `removed`, `same`,
-//! `dirtied` or `trouble`) and, if it is dirtied, `diff` as above; if there is trouble, `message`.
-//! Units are in the names: `_m` metres, `_deg` degrees, `_cd` candela, `_lux`. What is infinite is
+//! It is one JSON object on one line. `schema` is `candelabra.diff` and `version` is 1. Within a version
+//! fields may be added, and none changes or is removed.
+//!
+//! For two files the object holds what [`Diff`] holds: `before` and `after` (`file`, `is_tree`),
+//! `totals`, `picking` (or `null`) and `changes`. Each change has `verb`, `share`, `before` and `after`
+//! (or `null`) and `differences`; each difference has an `aspect` and its amounts.
+//!
+//! For two folders it holds `before`, `after` and `shots`. Each shot has `name` and `outcome` (`added`,
+//! `removed`, `same`, `dirtied` or `trouble`). A dirtied shot has a `diff` as above, and one with trouble
+//! a `message`.
+//!
+//! Units are in the names: `_m` metres, `_deg` degrees, `_cd` candela, `_lux` lux. An infinite number is
 //! `null`.
 
 use super::{Diff, FolderDiff};

@@ -4,14 +4,14 @@ use super::card::{Kind, LightCard};
 use crate::light_tree::{LightLook, LightRow};
 use glam::{Affine3A, Vec3, Vec3A};
 
-/// What all lights of both versions are matched by: as little as will do, for there may be millions.
+/// What a light is matched by. It is kept small, because there may be millions of lights.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Light<'a> {
     pub path: &'a str,
     pub row: Row,
-    /// Over what the tree depends on.
+    /// A hash of everything about the light that the tree depends on.
     pub fingerprint: [u8; 32],
-    /// Of [`LightRow`].
+    /// The bits of [`LightRow`]'s class.
     pub class: u32,
     pub kind: Option<Kind>,
     /// The hue, coded as in [`LightLook`].
@@ -19,7 +19,7 @@ pub(super) struct Light<'a> {
     /// In the unit of [`LightCard::energy`].
     pub energy: f32,
     pub emitters: u32,
-    /// What a scene says beyond its survey; a tree says nothing.
+    /// What only a scene tells; the default for a light of a tree.
     pub profile: Profile,
 }
 
@@ -32,10 +32,10 @@ pub(super) enum Row {
     Infinite(u32),
 }
 
-/// How the light of a prim is spread, as its author says.
+/// How the light of a prim is distributed over its surface and over directions.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Profile {
-    /// Over its texture and its shaping but for the half angle.
+    /// A hash of its texture and of its shaping without the half angle.
     pub pattern: u128,
     /// Half angle of the shaping, radians, if it has one.
     pub half_angle_rad: Option<f32>,
@@ -47,12 +47,12 @@ pub(super) struct Described {
     pub card: LightCard,
     /// From its own space to the world's, if that is known.
     pub to_world: Option<Affine3A>,
-    /// Over its emitters in its own space, if they are known.
+    /// A hash of its emitters in its own space, if they are known.
     pub shape: Option<u128>,
-    /// Whether it aims to either side of its axis.
+    /// Whether it shines to both sides of its axis.
     pub two_sided: bool,
     pub profile: Profile,
-    /// Whether it has a tree of its own, which says less of where its emitters are.
+    /// Whether it has a tree of its own, which tells its place less exactly.
     pub placed: bool,
 }
 
@@ -70,7 +70,7 @@ impl Described {
 }
 
 impl Light<'_> {
-    /// What it says itself; where it is, a side may know.
+    /// What is known without its place; a side may add the place.
     pub fn described(&self) -> Described {
         Described {
             card: self.card(),
@@ -90,7 +90,7 @@ impl Light<'_> {
             && self.profile == other.profile
     }
 
-    /// An old tree file does not tell, and then nothing differs.
+    /// Whether kind and colour agree. An old tree file does not tell them; then they count as equal.
     fn looks_like(&self, other: &Light) -> bool {
         let told = self.kind.is_some() && other.kind.is_some();
         !told || (self.kind, self.color) == (other.kind, other.color)
@@ -105,7 +105,7 @@ impl Light<'_> {
         self.is(LightRow::CHANGES)
     }
 
-    /// What a card of it says before it is known where the light is.
+    /// Its card, without its place.
     pub fn card(&self) -> LightCard {
         LightCard {
             path: self.path.to_owned(),
@@ -123,7 +123,8 @@ impl Light<'_> {
     }
 }
 
-/// What a tree says of a light that is dark in its first frame is not quite nothing.
+/// Turns a tiny energy into 0: a tree holds a positive energy even for a light that is dark in its first
+/// frame.
 pub(super) fn without_crumbs(energy: f32) -> f32 {
     if energy < 1e-30 { 0.0 } else { energy }
 }

@@ -1,12 +1,19 @@
-//! Which light of one version is which of the other: content first, place in the file last.
+//! Which light of one version corresponds to which of the other: content first, place in the file last.
 //!
-//! A path that the file gives identifies a light, whatever changed of it. A path that ingest made unique
-//! ([`family`](super::family)) only tells where in its file a light stands. So lights of one family are
-//! the same if nothing of them differs; what is left of a family pairs in order of place.
-//! Lights of different paths are the same under another name if nothing else differs. Of those that are
-//! left then, lights whose last names and looks agree were carried along by a prim above them.
-//! Where several are equal, they pair in order of their paths. The order in which a version lists its
-//! lights does not matter.
+//! A path that the file gives identifies a light, whatever else changed. A path that ingest made unique
+//! (see [`family`](super::family)) only says where in its file the light stands. Lights are matched in
+//! this order:
+//!
+//! 1. Lights with the same path and the same content.
+//! 2. Lights of one family with the same fingerprint.
+//! 3. Lights with the same path, if the path is not one of a family.
+//! 4. Lights with the same fingerprint under different paths: they were renamed.
+//! 5. What is left of a family, in order of place in the file.
+//! 6. Lights whose last path component, kind, emitter count, colour, class and energy agree: a prim
+//!    above them was renamed or moved.
+//!
+//! Equal candidates pair in order of their paths. The order in which a version lists its lights does
+//! not matter.
 
 use super::family::Families;
 use super::light::Light;
@@ -87,8 +94,8 @@ fn divide(
     (numbered, others)
 }
 
-/// Pairs lights of one family that agree in a key, equal ones in the order of their paths; and what is
-/// left of either version.
+/// Pairs lights of the same family and the same key; equal ones pair in the order of their paths. Also
+/// returns the rows of each version that found no partner.
 fn join_families<K: Ord>(
     lists: [&[Light]; 2],
     mut rows: [Numbered; 2],
@@ -141,15 +148,16 @@ fn by_content(a: &Light, b: &Light) -> Ordering {
 fn by_look(a: &Light, b: &Light) -> Ordering {
     fn look<'a>(light: &Light<'a>) -> impl Ord + use<'a> {
         let last_name = light.path.rsplit('/').next();
-        // Energies of meshes carry the rounding of their place: a quarter of a per cent is the same.
+        // The energy of a mesh depends on its place by rounding, so it is compared in steps of 1/256
+        // stop, about a quarter of a per cent.
         let energy = (light.energy.log2() * 256.0).round() as i32;
         (last_name, light.kind, light.emitters, light.color, light.class, energy)
     }
     look(a).cmp(&look(b))
 }
 
-/// Pairs rows of two lists that are equal by some order, equal ones in the order of their paths; and
-/// what is left of either, in the order of its paths.
+/// Pairs rows of two lists that compare equal by `key`; several equal ones pair in the order of their
+/// paths. Also returns the rows of each list that found no partner, in the order of their paths.
 fn join(lists: [&[Light]; 2], rows: [Vec<u32>; 2], key: Order) -> (Vec<(u32, u32)>, [Vec<u32>; 2]) {
     let [left, right] = [0, 1].map(|side: usize| {
         let of = |&row: &u32| &lists[side][row as usize];

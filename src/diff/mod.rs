@@ -1,20 +1,21 @@
-//! Floor 6: what changed between two versions of a scene, as far as its light goes.
+//! Floor 6: what changed in the lights between two versions of a scene.
 //!
 //! A version is a [`Side`]: a scene, or the tree file that was built from it. [`compare()`] matches the
-//! lights of both and says which were added, removed, dirtied or renamed, of the dirtied *what*
-//! changed and *by how much*, and what that does to picking. Prims that send no light are not
-//! compared; where they change what the camera sees of the lights, the [`HeatMap`] shows it.
+//! lights of both and says which were added, removed, dirtied or renamed. For a dirtied light it says
+//! *what* changed and *by how much*. It also measures how the probabilities of picks moved. Prims that
+//! emit no light are not compared; the [`HeatMap`] shows where they change what the camera sees.
 //!
-//! Two scenes are compared by what their files say. A tree file knows less: of its lights the bounds,
-//! the energy, the kind, the colour and a fingerprint. Against a tree, a scene is therefore surveyed as
-//! for a build, and both are compared by what both have; so a tree that is fresh differs in nothing.
+//! Two scenes are compared by what their files say. A tree file holds less: the bounds, energy, kind,
+//! colour and fingerprint of each light. A scene that is compared with a tree is therefore surveyed as
+//! for a build, and only what both have is compared. So a tree that is up to date does not differ from
+//! its scene.
 //!
 //! | file | what |
 //! |---|---|
 //! | `side`, `tree_side`, `scene_side` | a version, opened; what a tree tells, what a scene tells |
-//! | `sight` | what both are looked at through |
+//! | `sight` | the cameras of both |
 //! | `light`, `profile`, `infinite` | a light as it is matched; its texture and shape; suns and domes |
-//! | `matching`, `pairs` | which light is which, renames among them |
+//! | `matching`, `pairs` | which light corresponds to which, with renames |
 //! | `card`, `describe` | one light, described |
 //! | `change`, `amounts` | one light that differs, and each [`Difference`] with its amount |
 //! | `over_time` | lights that change, followed through the frames |
@@ -74,10 +75,9 @@ pub struct Diff {
     pub totals: Totals,
     /// How far the probabilities of picks moved; `None` where neither version has a light to pick.
     pub picking: Option<PickingChange>,
-    /// The lights that differ, what matters most to the light first.
+    /// The lights that differ, by descending [`Change::share`].
     pub changes: Vec<Change>,
-    /// Where the lights stand that are the same in both, for a picture of the whole. Only if asked
-    /// for.
+    /// The lights that are the same in both versions, for a picture of the whole. Only if asked for.
     #[serde(skip)]
     pub unchanged: Vec<Mark>,
     /// Where in the camera's view direct light changed. Only if asked for, and if both versions are
@@ -95,7 +95,7 @@ pub struct SideName {
     pub is_tree: bool,
 }
 
-/// A light of which nothing is said but where it stands and how strong it is.
+/// The position and the energy of a light.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Mark {
     /// Middle of its box, world space, metres.

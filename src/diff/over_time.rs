@@ -27,8 +27,8 @@ enum Strength {
     Instance(u32),
 }
 
-/// Of pairs that change in both scenes, by their numbers: over the frames of either, one pose at a time.
-/// `shift` is from the origin of the first scene to that of the second.
+/// How far apart the versions of each light come that changes in both scenes, by the light's number. All
+/// frames of either scene count. `shift` is from the origin of the first scene to that of the second.
 pub(super) fn apart(scenes: [&SceneSide; 2], pairs: &[Pair], shift: Vec3) -> HashMap<u32, Apart> {
     let animated: Vec<(u32, [Animated; 2])> = pairs
         .iter()

@@ -34,18 +34,19 @@ impl Pair<'_> {
 
 /// All lights of both.
 pub(super) struct Pairs<'a> {
-    /// Those that are not known to be the same.
+    /// The pairs that are not known to be the same.
     pub changed: Vec<Pair<'a>>,
-    /// Those that are, by row of the version after.
+    /// The lights that are the same, by row of the version after.
     pub unchanged: Vec<u32>,
-    /// Of each row of the version after its light's number. That of a row before is the row.
+    /// The number of the light in each row of the version after. In the version before, a light's number
+    /// is its row.
     pub number_of_after: Vec<u32>,
     /// How many numbers there are.
     pub count: usize,
 }
 
 impl<'a> Pairs<'a> {
-    /// Pairs them; `scenes` only if both versions are.
+    /// Pairs the lights of two versions. `scenes` is given only if both versions are scenes.
     pub fn of(
         scenes: Option<[&'a SceneSide<'a>; 2]>,
         [before, after]: [&[Light<'a>]; 2],
@@ -73,7 +74,7 @@ impl<'a> Pairs<'a> {
                 pairs.changed.push(Pair { verb, before: then, after: now, number: b });
             }
         }
-        // A light that one scene lacks may be there as a prim that is dark: then it was switched.
+        // A light that one scene lacks may be there as a dark prim: then it was switched on or off.
         let dark = |side: usize, only: &[u32]| match scenes {
             Some(scenes) if !only.is_empty() => scenes[side].dark_prims(),
             _ => HashMap::new(),

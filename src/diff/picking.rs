@@ -1,11 +1,12 @@
 //! How far the probabilities of picks moved.
 //!
-//! At a probe, either version picks one light: each has a probability. How far apart two such
-//! distributions are is their *total variation distance*, half the sum of all `|p_before - p_after|`:
-//! the share of picks that go to another light. 0 if they are equal, 1 if they have no light in
-//! common. Lights are matched as everywhere, so a light that was only renamed is the same. That
-//! nothing can be picked counts as a light of its own. Forced lights, which are never picked, do not
-//! count. Exact, for a surface that reflects alike everywhere: both trees are walked whole.
+//! At a probe, each version picks one light, and every light has a probability. The distance between two
+//! such distributions is their *total variation distance*, half the sum of all `|p_before - p_after|`:
+//! the share of picks that go to another light. It is 0 if the distributions are equal and 1 if they
+//! have no light in common. Lights are matched as in the rest of the comparison, so a light that was
+//! only renamed is the same. The event that nothing is picked counts as one more light. Forced lights are
+//! never picked and do not count. The probabilities are exact for a diffuse surface: both trees are
+//! walked whole.
 
 use super::scene_side::SceneSide;
 use crate::emitter::InfiniteLight;
@@ -39,7 +40,7 @@ pub enum ProbePlaces {
     BoxAroundLights,
 }
 
-/// What lights are picked with at a probe: a version's tree, and what competes with it.
+/// What picks lights at a probe: a version's tree, and the infinite lights that compete with it.
 pub(super) struct Picks<'a> {
     frame: FrameTree<'a>,
     /// For each emitter the number of its light.
@@ -49,8 +50,8 @@ pub(super) struct Picks<'a> {
 }
 
 impl<'a> Picks<'a> {
-    /// Those of a version in its first frame, given the numbers of its lights; with the lights at
-    /// infinity of a scene, if they are to compete.
+    /// The picks of a version in its first frame. `numbers` are those of its lights. The infinite lights
+    /// of `scene` compete with the tree, if a scene is given.
     pub fn new<D: AsRef<[u8]>>(
         tree: &'a LightTree<D>,
         table: &'a LeafTable,
@@ -70,8 +71,9 @@ impl<'a> Picks<'a> {
         }
     }
 
-    /// Calls `visit` with numbers of lights and probabilities of picking them, without splitting;
-    /// those of one light may come in parts. What they lack to 1 is left.
+    /// Calls `visit` with the number of each light and the probability of picking it, without splitting.
+    /// The probability of one light may come in several calls. If they sum to less than 1, the rest is
+    /// the probability that nothing is picked.
     fn for_each(&self, receiver: &Receiver, mut visit: impl FnMut(u32, f64)) {
         let importance = |light: &InfiniteLight| light.importance(receiver.normal);
         let of_tree = self.frame.total_importance(receiver);
@@ -89,11 +91,12 @@ impl<'a> Picks<'a> {
     }
 }
 
-/// Probes are walked in so many runs, each in its order, so that sums do not depend on threads.
+/// The probes are divided into this many runs. Each run goes through its probes in order, so that sums
+/// do not depend on the number of threads.
 const RUNS: usize = 8;
 
-/// What changed at some probes; and for each light, of `lights` in all, the probability that it gained
-/// or lost, in the mean.
+/// How far the probabilities moved at some probes. Also returns, for each of `lights` lights, the mean
+/// of the absolute change of its probability.
 pub(super) fn picking_change(
     [before, after]: [&Picks; 2],
     lights: usize,
@@ -115,7 +118,7 @@ pub(super) fn picking_change(
                     *sum += probability;
                 });
             }
-            // What sums lack to 1 is the probability that nothing is picked.
+            // One minus a sum is the probability that nothing is picked.
             let mut distance = (sums[1] - sums[0]).abs();
             let [before, after] = &shares;
             for (moved, (before, after)) in moved.iter_mut().zip(before.iter().zip(after)) {

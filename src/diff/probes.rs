@@ -28,8 +28,8 @@ pub(super) fn on_camera_paths<D: AsRef<[u8]> + Sync>(
     found.ok().filter(|found: &Vec<Receiver>| !found.is_empty())
 }
 
-/// Points spread evenly over a box, half as large again to every side, that see light from every
-/// direction.
+/// Points spread evenly over a box that is enlarged by half its size on every side. They receive light
+/// from every direction.
 pub(super) fn around(lights: &Aabb) -> Vec<Receiver> {
     let diagonal = lights.extent().length();
     // Around a single point, a metre is as good as any distance.
@@ -39,13 +39,14 @@ pub(super) fn around(lights: &Aabb) -> Vec<Receiver> {
         Vec3::ONE
     };
     let (low, size) = (lights.min - margin, lights.extent() + 2.0 * margin);
-    // The lattice of rank 1 that goes on the powers of the plastic number's kin (Roberts, 2018).
+    // The R3 sequence (Roberts, 2018): a lattice of rank 1 with steps g^-1, g^-2, g^-3, g^4 = g + 1.
     let step = [0.819_172_513_4_f64, 0.671_043_606_7, 0.549_700_477_9];
     let at = |i: u32| Vec3::from(step.map(|step| (0.5 + step * f64::from(i)).fract() as f32));
     (0..PROBES).map(|i| Receiver { point: low + size * at(i), normal: Vec3::ZERO }).collect()
 }
 
-/// Which of two versions' cameras is looked through, and the points; else those around all lights.
+/// The probes and where they are: on camera paths of the version after, else of the version before, else
+/// in the box around all lights.
 pub(super) fn probes<D: AsRef<[u8]> + Sync>(
     sides: [Option<&SceneSide>; 2],
     trees: [&LightTree<D>; 2],

@@ -1,15 +1,16 @@
-//! How the lights of a scene are spread, and their shapes: what bounds do not tell, as hashes.
+//! Hashes of what bounds do not tell: the emission patterns of a scene's lights, and their shapes.
 
 use super::light::Profile;
 use crate::emitter::{Emitters, LightSource, MeshLight};
 use crate::scene::{LightKind, Pixels, Scene, Shaping, Texture};
 use rayon::prelude::*;
 
-/// Hashes over what lights share. Hashed once, however often a mesh is put into the scene.
+/// Hashes of what the instances of a mesh light share. Each is computed once, however many instances
+/// there are.
 pub(super) struct Profiles {
-    /// Of the emission texture on each mesh light; 0 without one.
+    /// The hash of the emission texture of each mesh light; 0 without a texture.
     textures: Vec<u128>,
-    /// Of the emitters of each in its own space.
+    /// The hash of the emitters of each mesh light, in its own space.
     shapes: Vec<u128>,
 }
 
@@ -22,7 +23,7 @@ impl Profiles {
         }
     }
 
-    /// Of a light that is not at infinity.
+    /// The profile of a light that is not infinite.
     pub fn of_light(&self, scene: &Scene, source: LightSource) -> Profile {
         let (shaping, texture) = match source {
             LightSource::Mesh { instance, mesh_light } => {
@@ -53,7 +54,7 @@ impl Profiles {
         Profile { pattern: short(&hasher), half_angle_rad }
     }
 
-    /// Of the emitters of a mesh light in its own space.
+    /// The hash of the emitters of a mesh light, in its own space.
     pub fn shape(&self, mesh_light: u32) -> u128 {
         self.shapes[mesh_light as usize]
     }
@@ -66,7 +67,7 @@ pub(super) fn short(hasher: &blake3::Hasher) -> u128 {
     u128::from_le_bytes(bytes)
 }
 
-/// Adds what a texture looks like, whatever its name.
+/// Adds the size, sampling and pixels of a texture, but not its name.
 pub(super) fn add_texture(hasher: &mut blake3::Hasher, texture: &Texture) {
     hasher.update(&texture.width.to_le_bytes()).update(&texture.height.to_le_bytes());
     let [u, v] = texture.wrap.map(|wrap| wrap as u8);

@@ -19,22 +19,20 @@ use std::path::Path;
 /// A scene, surveyed as for a build.
 pub(super) struct SceneSide<'a> {
     pub scene: &'a Scene,
-    /// What it is looked at through.
     pub camera: Option<&'a Camera>,
     pub emitters: Emitters,
-    /// Of all frames, but with the bounds of the first alone.
+    /// The survey of all frames, but with the bounds of the first only.
     pub survey: Survey,
-    /// The frames.
     pub frames: Vec<i32>,
-    /// In the first frame.
+    /// The pose in the first frame.
     pub pose: Pose,
     profiles: Profiles,
     infinite: Vec<Infinite>,
 }
 
 impl<'a> SceneSide<'a> {
-    /// Surveys a scene for some frames, its own if none are given. If there is a tree to compare it
-    /// with that says it was built from this very scene, its leaves must be the scene's.
+    /// Surveys a scene for some frames, or for its own if none are given. `beside` is a tree to compare
+    /// it with. If that tree says that it was built from this scene, its leaves must agree with it.
     pub fn survey(
         scene: &'a Scene,
         camera: Option<&'a Camera>,
@@ -78,8 +76,8 @@ impl<'a> SceneSide<'a> {
         LightTree::open(bytes).expect("what was just built can be opened")
     }
 
-    /// The lights at infinity that are picked and shine in the first frame, with their numbers, which
-    /// are given in the order of [`lights`](Self::lights).
+    /// The infinite lights that shine in the first frame and are not forced, each with its number.
+    /// `numbers` are those of the infinite lights, in the order of [`lights`](Self::lights).
     pub fn infinite_to_pick(&self, numbers: &[u32]) -> Vec<(u32, InfiniteLight<'_>)> {
         let picked = infinite_lights(self.scene, &self.pose).into_iter().filter(|l| !l.forced);
         let number = |light: &InfiniteLight| {
@@ -130,7 +128,7 @@ impl<'a> SceneSide<'a> {
         };
         let entry = &self.emitters.lights()[row as usize];
         let bounds = self.posed().bounds(entry.first..entry.first + entry.count);
-        // A light with a tree of its own is in range there, but may not be in the world.
+        // A light with a tree of its own is in range in its own space, but may not be in world space.
         let around = bounds.map(|bounds| match bounds.as_slice() {
             [one] => *one,
             all => LightBounds::around(all),
@@ -153,7 +151,7 @@ impl<'a> SceneSide<'a> {
         described
     }
 
-    /// The prims that might shine and do not, by path: what a light was before it was lit.
+    /// The instances and lights of the scene that emit nothing, by path.
     pub fn dark_prims(&self) -> HashMap<&str, Dark> {
         let is_lit: std::collections::HashSet<&str> =
             self.lights().iter().map(|light| light.path).collect();

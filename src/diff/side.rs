@@ -174,8 +174,8 @@ impl<'a> Surveyed<'a> {
         Ok([before?, after?])
     }
 
-    /// Whether both are trees that say the same of all lights: fingerprints and checksums, which have
-    /// been verified, decide.
+    /// Whether both are trees with the same rows of lights. Only fingerprints and checksums are compared,
+    /// which have been verified.
     pub fn has_rows_of(&self, other: &Surveyed) -> bool {
         match (self, other) {
             (Surveyed::Tree(own), Surveyed::Tree(other)) => own.has_rows_of(other),
@@ -183,7 +183,7 @@ impl<'a> Surveyed<'a> {
         }
     }
 
-    /// Whether both are trees that say they are of one content and are not the same.
+    /// Whether both are trees with the same fingerprint that are not the same.
     pub fn contradicts(&self, other: &Surveyed) -> bool {
         match (self, other) {
             (Surveyed::Tree(own), Surveyed::Tree(other)) => own.contradicts(other),
@@ -191,7 +191,7 @@ impl<'a> Surveyed<'a> {
         }
     }
 
-    /// Over all that a tree depends on.
+    /// A hash of everything that the tree depends on.
     pub fn fingerprint(&self) -> [u8; 32] {
         match self {
             Surveyed::Tree(side) => side.fingerprint(),

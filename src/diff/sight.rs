@@ -1,12 +1,12 @@
-//! What two versions are looked at through.
+//! The cameras of two versions.
 
 use super::side::Side;
 use crate::pipeline::{ASPECT, View, ViewError, carry_camera, look};
 
-/// Chooses a camera for each version that is a scene. A camera that the view names, or the first of a
-/// scene, is that of each version. A place that the view tells, or one that was found for scenes without
-/// a camera, is the same for both: that for the version after, if it is a scene. Returns a note on where
-/// it is, if the user did not say.
+/// Chooses a camera for each version that is a scene. If the view names a camera, each version uses its
+/// own camera of that name; by default each uses its first. If the view gives a place, or if neither
+/// scene has a camera, one camera is chosen for the version after (for the one before, if the version
+/// after is a tree) and both use it. Returns a note on where that camera is, if the user did not say.
 ///
 /// # Errors
 /// If there is no such camera, or the view contradicts itself.
@@ -39,7 +39,7 @@ pub fn look_at_both(
     Ok(note)
 }
 
-/// Gives a scene without a camera that of another.
+/// Gives a scene without a camera the camera of another scene.
 fn follow(side: &mut Side, other: &Side) {
     let (Some(there), Some(camera)) = (other.scene(), other.camera()) else { return };
     if side.camera.is_none()

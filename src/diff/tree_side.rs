@@ -1,7 +1,7 @@
 //! What a tree file tells of its lights.
 //!
-//! Where a light is, its leaves tell: their decoded boxes and cones, which are a little wider than
-//! what they bound. A light with a tree of its own has a transform too.
+//! The leaves of a light tell where it is: their decoded boxes and cones, which are a little wider than
+//! what they bound. A light with a tree of its own also has a transform.
 
 use super::card::{LightCard, Place};
 use super::light::{Described, Light, Profile, Row, kind_of, without_crumbs};
@@ -15,7 +15,7 @@ use std::f32::consts::PI;
 
 /// The sections that list lights.
 const ROWS: [&[u8; 4]; 2] = [b"LGHT", b"PATH"];
-/// The sections that follow from the content's fingerprint.
+/// The sections that must be equal if the fingerprints are: the content determines them.
 const TREES: [&[u8; 4]; 5] = [b"TREE", b"GRUP", b"INST", b"FRAM", b"FORC"];
 
 /// A tree, opened.
@@ -46,8 +46,8 @@ impl<'a> TreeSide<'a> {
         self.fingerprint() == other.fingerprint() && self.has_sections_of(other, &ROWS)
     }
 
-    /// Whether both have the fingerprint of one content and yet other trees: the same content gives
-    /// the same bytes.
+    /// Whether both have the same fingerprint but different trees. That is a contradiction, because the
+    /// same content gives the same bytes.
     pub fn contradicts(&self, other: &TreeSide) -> bool {
         self.fingerprint() == other.fingerprint() && !self.has_sections_of(other, &TREES)
     }
@@ -86,9 +86,9 @@ fn of_row<'a, D: AsRef<[u8]>>(tree: &'a LightTree<D>, row: u32, light: &'a Light
 /// Where the lights of a tree are in its first frame.
 pub(super) struct Places<'a, D> {
     tree: &'a LightTree<D>,
-    /// By ascending emitter; those of lights with trees of their own are not here.
+    /// The leaves by ascending emitter, without those of lights with trees of their own.
     leaves: Vec<(u32, Node)>,
-    /// Those, by their first emitters.
+    /// The lights with trees of their own, by their first emitters.
     placed: HashMap<u32, &'a InstanceRow>,
 }
 
@@ -165,7 +165,8 @@ impl<'a, D: AsRef<[u8]>> Places<'a, D> {
         (bounds, to_world)
     }
 
-    /// In the order of the emitters, so that the tree around them does not matter.
+    /// The bounds of a light's leaves, joined in the order of the emitters, so that they do not depend on
+    /// the shape of the tree.
     fn around_leaves(&self, row: &LightRow) -> Option<LightBounds> {
         let first = self.leaves.partition_point(|&(emitter, _)| emitter < row.first_emitter);
         let own = self.leaves[first..].iter();

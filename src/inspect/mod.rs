@@ -1,8 +1,8 @@
 //! Floor 6: looking inside tree files and scenes.
 //!
-//! [`TreeReport`] and [`SceneReport`] are numbers, for programs and for people; [`dot()`] is the top of a
-//! tree as a graph, [`html()`] a page with pictures. None changes what it looks at, and none samples:
-//! what a tree is worth at a point is [`measure`](crate::measure)'s to say.
+//! [`TreeReport`] and [`SceneReport`] are numbers, for programs and for people. [`dot()`] draws the top
+//! of a tree as a graph, and [`html()`] makes a page with pictures. None of them changes what it looks
+//! at, and none samples lights: [`measure`](crate::measure) tells how good a tree is at a point.
 //!
 //! | file | what |
 //! |---|---|
@@ -26,6 +26,7 @@ pub use report::{FrameSpan, LightReport, SectionReport, TreeReport};
 pub use scene::{CameraReport, SceneReport};
 pub use shape::{Shape, shapes};
 
-/// The version of the reports as JSON: in it fields may be added, and none changes or goes. Units are
-/// candela, metres and degrees; shares are in `[0, 1]`. Version 2: notes have a category and a text.
+/// The version of the reports as JSON. Within a version fields may be added, and none changes or is
+/// removed. Units are candela, metres and degrees; shares are in `[0, 1]`. Since version 2 notes have a
+/// category and a text.
 pub const VERSION: u32 = 2;

@@ -16,18 +16,18 @@ pub struct Shape {
     pub groups: usize,
     /// Their leaves: emitters, and other trees.
     pub leaves: usize,
-    /// How many of the lanes of their groups are used, `(0, 1]`.
+    /// The share of the lanes of their groups that are used, `(0, 1]`.
     pub fill: f64,
     /// Groups on the way to the deepest leaf.
     pub deepest: usize,
     /// Groups on the way to a leaf, in the mean over all leaves.
     pub mean_depth: f64,
-    /// The cost that the build keeps low, of a whole tree: the sum over its groups of
-    /// `energy * M_A * M_omega` of the cluster that the group opens, over the root's. If the chance that
-    /// a viewer somewhere opens a cluster is in proportion to that measure (the seed's surface area
-    /// and orientation heuristic), it is the number of groups that a viewer opens who opens the root.
-    /// From 1, a tree of one group, upwards; of two trees over the same emitters the smaller is the
-    /// better. In the mean over the trees.
+    /// The mean over the trees of the cost that the build minimizes. The cost of a tree is the sum of
+    /// `energy * M_A * M_omega` over the clusters that its groups open, divided by the root's value.
+    /// Suppose that the probability that a cluster is opened is proportional to that measure (the
+    /// seed's surface area and orientation heuristic). Then the cost is the expected number of groups
+    /// that are opened if the root is. A tree of one group costs 1. Of two trees over the same emitters
+    /// the one of lower cost is better.
     pub cost: f64,
 }
 
@@ -72,7 +72,7 @@ pub fn shapes<D: AsRef<[u8]>>(tree: &LightTree<D>) -> Vec<Shape> {
     kinds.into_iter().filter_map(of_kind).collect()
 }
 
-/// For each group of a tree, the groups on the way to it, itself included.
+/// For each group of a tree, the number of groups on the way to it, itself included.
 fn depths(groups: &[Group]) -> Vec<usize> {
     let mut depths = vec![1; groups.len()];
     for (own, group) in groups.iter().enumerate() {
@@ -92,7 +92,7 @@ fn depths(groups: &[Group]) -> Vec<usize> {
 fn cost(row: &TreeRow, groups: &[Group]) -> f64 {
     let root = measure(&row.root.bounds());
     if root == 0.0 {
-        // All in one place: every cluster is like the root.
+        // All emitters are in one place: every cluster counts as much as the root.
         return groups.len() as f64;
     }
     let opened = groups.iter().flat_map(Group::nodes);

@@ -5,12 +5,12 @@ use crate::light_tree::{Group, InstanceRow, LightTree, Link, Node, TreeKind, Tre
 use crate::pipeline::origin_of;
 use glam::Affine3A;
 
-/// A node that a walk comes by.
+/// A node that a walk visits.
 #[derive(Clone, Copy, Debug)]
 pub struct Stop {
     /// Its number among all stops.
     pub number: usize,
-    /// That of the cluster that it is part of; roots have none.
+    /// The number of the cluster that it is part of; roots have none.
     pub parent: Option<usize>,
     /// Groups on the way to it; a root has 0.
     pub depth: usize,
@@ -18,7 +18,7 @@ pub struct Stop {
     pub what: What,
     /// Its box, world space.
     pub aabb: Aabb,
-    /// Its energy there, candela.
+    /// Its energy in world space, candela.
     pub energy: f64,
     /// The node, in the space of its tree.
     pub node: Node,
@@ -35,9 +35,9 @@ pub enum What {
     Emitter(usize),
 }
 
-/// Goes down from the root of a file's first frame, and from each light that is forced then. Calls
-/// `visit` with a cluster before its parts, which it comes to only if it is told to. The tree must have
-/// been verified.
+/// Walks down from the root of a file's first frame, and from each light that is forced in that frame.
+/// Calls `visit` with a cluster before its parts, and visits the parts only if `visit` returns `true`.
+/// The tree must have been verified.
 pub fn walk<D: AsRef<[u8]>>(tree: &LightTree<D>, visit: impl FnMut(&Stop) -> bool) {
     let mut walk = Walk { tree, visit, open: Vec::new(), stops: 0 };
     let first = tree.frames().first().map_or(0, |row| row.frame);
@@ -68,7 +68,7 @@ struct Walk<'a, D, F> {
 #[derive(Clone, Copy)]
 struct Space {
     to_world: Affine3A,
-    /// What energies are multiplied by on the way out.
+    /// The factor from energies in the tree to energies in the world.
     brightness: f64,
     /// The tree's emitters are numbered from here on.
     first_emitter: u32,

@@ -1,9 +1,9 @@
-//! An earlier version of a file, and what of it has stayed the same.
+//! An earlier version of a file, and what in it has stayed the same.
 //!
-//! Lights are compared by their fingerprints, which cover all that a tree depends on. One that has
-//! the fingerprint of a light of the base is unchanged, whatever it is called now and wherever it
-//! stands among the others. So its leaves must be those that a build would give it now: where they are
-//! not, the base [contradicts](Base::contradicts) the scene, and nothing of it is worth having.
+//! Lights are compared by their fingerprints, which cover everything that a tree depends on. A light
+//! with the fingerprint of a light of the base is unchanged, even if its name or its place among the
+//! others is not. Its leaves must then be those that a build would give it now. If they are not, the
+//! base [contradicts](Base::contradicts) the scene, and none of it can be used.
 
 use super::builder::{CHANGED, Earlier};
 use super::group::{Group, WIDTH};
@@ -24,13 +24,13 @@ pub struct Base<'a> {
     tree: LightTree<&'a [u8]>,
     /// The lights of the new file.
     list: &'a LightList<'a>,
-    /// For each of them the first emitter of the light of the base that it equals.
+    /// For each of them the first emitter of the same light in the base; `None` if it has changed.
     old_firsts: Vec<Option<u32>>,
-    /// Whether those follow each other as they did.
+    /// Whether the unchanged lights are in the same order as in the base.
     in_order: bool,
-    /// The first emitters of lights that are placed, and the rows of their trees; both ascending.
+    /// The first emitters of the base's placed lights, with the rows of their trees; ascending.
     placed: Vec<(u32, u32)>,
-    /// Whether a leaf was found that is not what it must be.
+    /// Whether a leaf was found that is not what its light's bounds give.
     contradicts: AtomicBool,
 }
 
@@ -50,12 +50,12 @@ impl<'a> Base<'a> {
         Base { list, old_firsts, in_order, placed, contradicts, tree }
     }
 
-    /// Whether some leaf of a light that has not changed is not what the light's bounds give.
+    /// Whether a leaf of an unchanged light was found that is not what the light's bounds give.
     pub fn contradicts(&self) -> bool {
         self.contradicts.load(Ordering::Relaxed)
     }
 
-    /// Whether a leaf is what some bounds give; notes it if not.
+    /// Whether a leaf is what some bounds give. If not, notes that the base contradicts the scene.
     fn agrees(&self, leaf: Option<Node>, bounds: Option<&LightBounds>) -> bool {
         let agrees = leaf.zip(bounds).is_some_and(|(leaf, bounds)| {
             leaf.difference(&Node::encode(bounds, Link::Nothing)).is_none()
@@ -66,8 +66,8 @@ impl<'a> Base<'a> {
         agrees
     }
 
-    /// The `nth` tree of its own that a light has, if the light, which has these bounds, has not
-    /// changed.
+    /// The `nth` tree that a light has for itself; `None` if the light has changed. `bounds` are those
+    /// of the light now.
     pub(super) fn own_tree(
         &self,
         light: usize,
@@ -87,8 +87,8 @@ impl<'a> Base<'a> {
         (emitter == old && agree()).then_some((tree, groups))
     }
 
-    /// The tree of what stands still, and where in it the leaves of the new one are. `leaf` tells what
-    /// they stand for, in the order of their emitters.
+    /// The base's tree of what stands still, and where in it the leaves of the new one are. `leaf` tells
+    /// what each new leaf stands for, in the order of their emitters.
     pub(super) fn still(
         &self,
         bounds: &[LightBounds],
@@ -98,7 +98,7 @@ impl<'a> Base<'a> {
         Some(self.earlier(self.still_row()?, own, bounds, leaf))
     }
 
-    /// The same of the tree of a frame, by its place among the frames.
+    /// The same for the tree of a frame, by its place among the frames.
     pub(super) fn frame(
         &self,
         frame: usize,
@@ -116,8 +116,8 @@ impl<'a> Base<'a> {
         self.tree.still_tree().map(|row| &self.tree.trees()[row as usize])
     }
 
-    /// Whether the tree of a frame may have got its clusters from the one before it, instead of
-    /// from a build: whether they differ in energies alone.
+    /// Whether the tree of a frame differs from the tree before it in energies alone. Then its clusters
+    /// may be a copy of that tree's, instead of those that a build would give.
     fn is_copy(&self, row: u32) -> bool {
         let [before, own] =
             [row.wrapping_sub(1), row].map(|row| self.tree.trees().get(row as usize));
@@ -170,7 +170,7 @@ impl<'a> Base<'a> {
         Earlier { groups: self.tree.groups_of(row), slots, in_order: self.in_order }
     }
 
-    /// The place of the light that a leaf belongs to, if it belongs to one.
+    /// The place of the light that a leaf belongs to; 0 if it belongs to none.
     fn light_before(&self, leaf: Leaf) -> usize {
         match leaf {
             Leaf::Emitter(emitter) => {
@@ -195,8 +195,8 @@ fn kind_of(tree: &LightTree<&[u8]>, row: u32) -> Option<TreeKind> {
     tree.trees().get(row as usize).and_then(TreeKind::of)
 }
 
-/// For each light the first emitter of the one in the tree that has the same class and content, each
-/// once; `None` if there is none.
+/// For each light the first emitter of the light in the tree with the same class and content; `None` if
+/// there is none. Each light of the tree is matched at most once.
 fn same_lights(tree: &LightTree<&[u8]>, lights: &[LightSummary]) -> Vec<Option<u32>> {
     let rows = tree.lights();
     let is_same = |row: &LightRow, light: &LightSummary| {
@@ -206,8 +206,8 @@ fn same_lights(tree: &LightTree<&[u8]>, lights: &[LightSummary]) -> Vec<Option<u
         let row = rows.get(old?)?;
         is_same(row, &lights[new]).then_some(row.first_emitter)
     };
-    // Most often all are the same but some in the middle: they stand as far from the start as they
-    // did, or as far from the end.
+    // Usually only some lights in the middle differ. All others are as far from the start as they were,
+    // or as far from the end.
     let mut found: Vec<_> =
         (0..lights.len()).into_par_iter().map(|new| at(Some(new), new)).collect();
     let ahead = found.iter().take_while(|found| found.is_some()).count();
@@ -220,7 +220,7 @@ fn same_lights(tree: &LightTree<&[u8]>, lights: &[LightSummary]) -> Vec<Option<u
     let behind = same_to_end.min(rows.len() - ahead);
     let (old_end, new_end) = (rows.len() - behind, lights.len() - behind);
     found[ahead..new_end].fill(None);
-    // Both stand in the order of class and path, and most have a partner where the other list is.
+    // Both lists are in order of class and path, so merging them finds most of the pairs.
     let (mut gone, mut come) = (Vec::new(), Vec::new());
     let (mut old, mut new) = (ahead, ahead);
     while old < old_end && new < new_end {
@@ -242,7 +242,7 @@ fn same_lights(tree: &LightTree<&[u8]>, lights: &[LightSummary]) -> Vec<Option<u
     }
     gone.extend(old..old_end);
     come.extend(new..new_end);
-    // Of the rest, those with the same content.
+    // The rest is paired by content alone.
     let content = |row: &LightRow| (row.class, row.fingerprint);
     let content_of_new = |light: &LightSummary| (light.class, light.fingerprint);
     gone.sort_by_key(|&old| content(&rows[old]));

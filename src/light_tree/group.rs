@@ -1,9 +1,9 @@
 //! A group: the eight children of a cluster, side by side in four cache lines.
 //!
-//! A step down the tree weighs eight clusters against each other at once. Next to a binary tree
-//! that is fewer steps, each with the same latency; a better choice, because no estimate of an
-//! intermediate cluster blurs it; and a smaller file, because the intermediate clusters are gone.
-//! Fields are kept apart, lane by lane, as vector instructions want them.
+//! A step down the tree chooses among eight clusters at once. Compared with a binary tree, this takes
+//! fewer steps of the same latency each. It chooses better, because no estimate of an intermediate
+//! cluster blurs the choice. And the file is smaller, because there are no intermediate clusters.
+//! Each field is an array over the lanes, as vector instructions need it.
 
 use super::importance::{Cluster, Sight, importance};
 use super::node::{self, Link, Node};
@@ -38,7 +38,7 @@ pub(super) struct Lanes {
     axis: [[f32; WIDTH]; 3],
     sin_half_theta_o: [f32; WIDTH],
     cos_theta_e: [f32; WIDTH],
-    /// Not zero if it is.
+    /// Nonzero if it is.
     two_sided: [u32; WIDTH],
     inverse_range2: [f32; WIDTH],
 }
@@ -68,7 +68,7 @@ impl Group {
         (0..WIDTH).filter_map(|lane| self.node(lane))
     }
 
-    /// The bounds of all lanes together: of what the nodes say, which is rounded outwards.
+    /// The bounds around all lanes, as the nodes store them: rounded outwards.
     ///
     /// # Panics
     /// If no lane is used.
@@ -152,7 +152,7 @@ impl Group {
     }
 }
 
-/// One thing of each lane, by a plain loop: `array::from_fn` is not turned into vectors.
+/// One value for each lane, by a plain loop: the compiler does not vectorise `array::from_fn`.
 #[inline(always)]
 fn each<T: Copy + Default>(of: impl Fn(usize) -> T) -> [T; WIDTH] {
     let mut all = [T::default(); WIDTH];
@@ -177,8 +177,7 @@ impl Group {
 
     #[inline(always)]
     pub(super) fn weigh_lanes(&self, viewer: &impl Viewer) -> ([f64; WIDTH], [f32; WIDTH]) {
-        // Lane by lane, each quantity in an array of its own: so the compiler computes all lanes
-        // together.
+        // Each quantity has an array over the lanes, so that the compiler computes all lanes together.
         let (mut products, mut decays, mut spreads) = ([0.0; WIDTH], [0.0; WIDTH], [0.0; WIDTH]);
         let mut sights = Sights::default();
         let lanes = self.decode();

@@ -6,12 +6,12 @@
 //!
 //! - The distance is `d^2 + r^2/10` with `r` the sphere's radius: no kink and no pole where the
 //!   receiver is inside, and in units of length squared, so that the scale of the scene cancels.
-//! - Importance 0 is a proof of darkness, so it is granted only beyond a [slack](EDGE_SLACK) that covers
-//!   all rounding; whatever else is small stays above a [floor](FLOOR).
+//! - Importance 0 means that no light can arrive, so it is returned only beyond a [slack](EDGE_SLACK)
+//!   that covers all rounding. Factors that are merely small are raised to a [floor](FLOOR).
 //!
-//! Lights with a range are dark beyond it: so is a cluster whose box is wholly out of reach of the
-//! longest range in it. Inside, the estimate takes glTF's window `1 - (d / range)^4`
-//! (`KHR_lights_punctual`) at the nearest point of the box.
+//! A light with a range is dark beyond it. A cluster is dark where its whole box is beyond the longest
+//! range in it. Nearer, the estimate takes glTF's window `1 - (d / range)^4` (`KHR_lights_punctual`)
+//! at the nearest point of the box.
 //!
 //! The formula is written once, for one lane, without a branch, so that the compiler computes the
 //! eight lanes of a group together.
@@ -19,22 +19,23 @@
 use super::viewer::Receiver;
 use glam::Vec3;
 
-/// A box this share of its distance above the horizon is not yet called below it: many times the
-/// rounding of the sums.
+/// A box is called below the horizon only if it is lower by more than this share of its distance and
+/// size: many times the rounding error of the sums.
 const HORIZON_SLACK: f32 = 1e-5;
-/// An angle this much beyond the cone's edge is not yet called dark, radians. The cosine of `theta_u` is
-/// off by up to 3.5e-4 just outside the sphere, and the angle with it.
+/// A direction is called dark only this far beyond the cone's edge, radians. Just outside the sphere the
+/// cosine of `theta_u` is off by up to 3.5e-4, and the angle with it.
 const EDGE_SLACK: f32 = 1e-3;
 /// The least value of a cosine factor that is not provably zero.
 const FLOOR: f32 = 1e-4;
 /// The share of the sphere's squared radius that softens the squared distance.
 pub(super) const SOFTENING: f32 = 0.1;
-/// Squares of distances and ranges are exact to so many parts.
+/// Allowance for the relative rounding error of squared distances and ranges.
 const RANGE_SLACK: f32 = 1e-5;
-/// So are differences of coordinates, of which a distance to a face of the box is what is left.
+/// Allowance for the relative rounding error of a difference of coordinates, from which the distance to
+/// a face of the box is computed.
 const FACE_SLACK: f32 = 4.0 * f32::EPSILON;
 
-/// What the formula needs of a cluster, decoded. Components apart, as lanes have them.
+/// What the formula needs of a cluster, decoded. Vectors are arrays of components, as lanes have them.
 #[derive(Clone, Copy, Debug)]
 pub struct Cluster {
     pub center: [f32; 3],
@@ -44,7 +45,7 @@ pub struct Cluster {
     pub sin_half_theta_o: f32,
     pub cos_theta_e: f32,
     pub two_sided: bool,
-    /// 1/m^2 of the longest range in it; 0 if any is without end.
+    /// `1 / range^2` of the longest range in it, 1/m^2; 0 if any light in it has no range.
     pub inverse_range2: f32,
 }
 
@@ -56,7 +57,7 @@ pub struct View {
 }
 
 impl View {
-    /// Of the sphere, sr; a hemisphere from inside.
+    /// Solid angle of the sphere, sr; that of a hemisphere from inside.
     pub fn solid_angle(&self) -> f64 {
         if self.radius <= 0.0 {
             return 0.0;
@@ -68,16 +69,17 @@ impl View {
 }
 
 impl Cluster {
-    /// Its sphere as seen from a point.
+    /// Its bounding sphere as seen from a point.
     pub fn view_from(&self, p: Vec3) -> View {
         let [center, half] =
             [self.center, self.half_extent].map(|v| Vec3::from_array(v).as_dvec3());
         View { radius: half.length(), distance: (center - p.as_dvec3()).length() }
     }
 
-    /// How much of its light leaves at some angle off its axis, given by cosine and sine (a cosine
-    /// alone knows nothing of small angles), seen under the half angle `theta_u`: 1 inside the cone,
-    /// falling to its edge, 0 only surely beyond. Also the cosine of `theta_o`.
+    /// The share of its light that leaves at some angle off its axis, for a cluster seen under the half
+    /// angle `theta_u`: 1 inside the cone, falling to its edge, 0 only surely beyond. The angle is given
+    /// by cosine and sine, because a cosine alone does not resolve small angles. Also returns the cosine
+    /// of `theta_o`.
     #[inline(always)]
     pub fn emission(
         &self,
@@ -93,7 +95,7 @@ impl Cluster {
         let cos_sum = cos_o * cos_u - sin_o * sin_u;
         let within = inside | (sin_sum < 0.0) | (cosine >= cos_sum);
         let off = cosine * cos_sum + sine * sin_sum;
-        // At most the cosine of theta_e and the slack together.
+        // A lower bound of the cosine of theta_e plus the slack.
         let cos_e = self.cos_theta_e;
         let sin_e = ((1.0 - cos_e) * (1.0 + cos_e)).max(0.0).sqrt();
         let edge = cos_e - EDGE_SLACK * (sin_e + EDGE_SLACK);
@@ -102,7 +104,7 @@ impl Cluster {
         (if is_dark { 0.0 } else { emission }, cos_o)
     }
 
-    /// The share of light that is left at a squared distance, m^2; 0 only surely out of range.
+    /// The share of light that the range leaves at a squared distance, m^2; 0 only surely out of range.
     #[inline(always)]
     pub fn window(&self, nearest2: f32) -> f32 {
         let ratio2 = nearest2 * self.inverse_range2;
@@ -114,24 +116,25 @@ impl Cluster {
 /// What an importance is made of.
 #[derive(Clone, Copy, Debug)]
 pub struct Factors {
-    /// The cosines, and all else that has no unit. 0 only where provably no light arrives.
+    /// The cosines and all other factors without a unit. 0 only where provably no light arrives.
     pub product: f32,
-    /// What the importance falls with: the squared distance, m^2; along a segment the distance, m.
+    /// What the importance is divided by: the squared distance, m^2; along a segment the distance, m.
     pub decay: f32,
     /// How uncertain it is: the squared relative deviation of what the cluster's emitters send.
     pub spread: f32,
-    /// Where it comes from.
+    /// The directions from which the light comes.
     pub sight: Sight,
 }
 
-/// Squared distances to the sphere's surface are not taken below this share of its squared radius:
-/// within, a cluster is as uncertain as it can be, but finitely so.
+/// Lower bound of `d^2 - R^2` as a share of `R^2`: closer to the sphere or inside it, a cluster is as
+/// uncertain as it can be, but the value stays finite.
 const CLOSEST: f32 = 0.05;
 
 /// The squared relative deviation of `1/d^2` for distances spread over a sphere of squared radius
 /// `r2` at a squared distance `d2`: `(4/3) R^2 / (d^2 - R^2)`, which is HPG 2018's equations 8 and 9
-/// without their cancellation. And of emission, for narrow beams spread over a wide cone: so many
-/// more than reach a receiver at once do not. (Faces reach half of all receivers, points every one.)
+/// without their cancellation. A second term is that of emission, for narrow beams spread over a wide
+/// cone: most of them miss a receiver. (It is 0 for faces and points, which reach half of all receivers
+/// and every one.)
 #[inline(always)]
 pub(super) fn spread(r2: f32, d2: f32, cos_o: f32, cos_e: f32) -> f32 {
     let of_distance = 4.0 / 3.0 * r2 / (d2 - r2).max(CLOSEST * r2).max(f32::MIN_POSITIVE);
@@ -146,7 +149,7 @@ pub struct Sight {
     pub to: [f32; 3],
     /// The largest cosine that any direction of the cone has with the normal; above zero.
     pub cosine: f32,
-    /// Of the cone's half angle; a right angle inside the sphere.
+    /// Cosine and sine of the cone's half angle, which is a right angle inside the sphere.
     pub cos_u: f32,
     pub sin_u: f32,
 }
@@ -159,8 +162,8 @@ impl Sight {
     }
 }
 
-/// Importance is energy times the product over the decay. Here without what becomes of the light at the
-/// receiver, for which the sight is there.
+/// The factors of the importance, which is energy times product over decay. They leave out what becomes
+/// of the light at the receiver: the viewer computes that from the sight.
 #[inline(always)]
 pub(super) fn factors(cluster: &Cluster, receiver: &Receiver) -> Factors {
     let [px, py, pz] = receiver.point.to_array();
@@ -221,9 +224,9 @@ pub(super) fn factors(cluster: &Cluster, receiver: &Receiver) -> Factors {
 /// span more than `f32` does.
 #[inline(always)]
 pub(super) fn importance(energy: f32, product: f32, decay: f32) -> f64 {
-    /// Below every distance that `f32` squares, above nothing at all.
+    /// Below every squared distance that an `f32` can hold, yet above zero.
     const LEAST: f64 = 1e-60;
     let importance = f64::from(energy) * f64::from(product) / (f64::from(decay) + LEAST);
-    // A file that nobody verified may hold any energy: never less than nothing, never no number.
+    // An unverified file may hold any energy: the importance is still neither negative nor NaN.
     importance.max(0.0)
 }

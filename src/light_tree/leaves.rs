@@ -1,9 +1,9 @@
-//! Where the leaf of each emitter is: what the way back from an emitter to its probability needs.
+//! Where the leaf of each emitter is. The probability of sampling a given emitter needs it.
 //!
-//! Emitters are numbered by class (see the [format](crate::store)): first those whose leaves are in
-//! the tree of what stands still, one by one; then those of shared trees that stand still; then the
-//! same two of what changes; then the forced. So the first kind is a plain table, the second a short
-//! search. Neither costs anything in the file.
+//! Emitters are numbered by class (see the [format](crate::store)). First come those of lights that
+//! stand still, with a leaf each; then those of lights that stand still in shared trees; then the same
+//! two classes of lights that change; then the forced lights. An emitter with a leaf of its own is
+//! looked up in a table, one in a shared tree by binary search. Neither takes room in the file.
 
 use super::group::{Group, WIDTH};
 use super::node::Link;
@@ -14,8 +14,8 @@ use super::tree::LightTree;
 pub(super) type Slot = u32;
 const NO_SLOT: Slot = u32::MAX;
 
-/// Where the leaf of every emitter that stands still is, and of those in shared trees. Made once for
-/// a shot by [`LightTree::leaf_table`].
+/// Where the leaves are of all emitters that stand still or are in shared trees.
+/// [`LightTree::leaf_table`] makes it once for a shot.
 #[derive(Clone, Debug, Default)]
 pub struct LeafTable {
     /// Of what stands still.
@@ -29,7 +29,7 @@ pub struct LeafTable {
 pub(super) struct Leaves {
     /// The first emitter that has a leaf of its own.
     first: u32,
-    /// Their slots.
+    /// The slots of the emitters from there on.
     slots: Vec<Slot>,
     /// Instances, by their first emitters, ascending.
     placed: Vec<Placed>,
@@ -41,11 +41,12 @@ pub(super) struct Leaves {
 pub(super) struct Placed {
     pub first_emitter: u32,
     pub instance: u32,
-    /// Its leaf; of a forced light, which has none, anything.
+    /// Its leaf. Without meaning for a forced light, which has none.
     pub slot: Slot,
 }
 
-/// The way down to a leaf: through at most three trees, each with the slot where the way goes on.
+/// The path down to a leaf, through at most three trees: for each tree the slot at which the path
+/// leaves it or ends.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Route {
     pub slots: [Slot; 3],
@@ -79,7 +80,7 @@ impl<D: AsRef<[u8]>> LightTree<D> {
         }
     }
 
-    /// The leaves of a tree, given which emitters have one each.
+    /// The leaves of a tree. `own` are the emitters that have a leaf each in it.
     pub(super) fn leaves_of(&self, tree: &TreeRow, own: std::ops::Range<u32>) -> Leaves {
         let most = self.groups_of(tree).len() * WIDTH;
         let mut leaves = Leaves {
@@ -123,8 +124,8 @@ impl<D: AsRef<[u8]>> LightTree<D> {
 }
 
 impl Leaves {
-    /// The slot where the way to an emitter leaves this tree, and the instance it goes on in, if it
-    /// does.
+    /// The slot at which the path to an emitter leaves this tree or ends. If it goes on in an instance,
+    /// that instance, too.
     pub fn find(&self, emitter: u32) -> Option<(Slot, Option<Placed>)> {
         let own = emitter.checked_sub(self.first).and_then(|at| self.slots.get(at as usize));
         match own {
@@ -137,7 +138,7 @@ impl Leaves {
     }
 }
 
-/// The instance that an emitter belongs to, of some in order of their emitters.
+/// The instance that an emitter belongs to. `placed` ascends by first emitter.
 pub(super) fn find_placed(placed: &[Placed], emitter: u32) -> Option<Placed> {
     let after = placed.partition_point(|placed| placed.first_emitter <= emitter);
     Some(placed[after.checked_sub(1)?])
@@ -157,8 +158,8 @@ impl LeafTable {
         (slot != NO_SLOT).then_some(slot)
     }
 
-    /// The way to an emitter from the root of a frame. `own` are the leaves of the frame's own tree,
-    /// if it has one.
+    /// The path to an emitter from the root of a frame. `own` are the leaves of the frame's own tree, if
+    /// it has one.
     pub(super) fn route(
         &self,
         own: Option<&Leaves>,
@@ -192,8 +193,8 @@ impl LeafTable {
     }
 }
 
-/// The lane of a group through which the way to another group of the same tree goes. Groups stand in
-/// preorder, so it is the last that leads no farther.
+/// The lane of a group through which the path to another group of its subtree goes, `distance` groups
+/// further on. Groups stand in preorder, so it is the last lane that leads no farther than that.
 #[inline]
 pub(super) fn lane_toward(group: &Group, distance: u32) -> Option<usize> {
     (0..WIDTH).rev().find(|&lane| matches!(group.link(lane), Link::Inner(by) if by <= distance))

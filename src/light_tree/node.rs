@@ -34,11 +34,11 @@ pub struct Node {
 pub enum Link {
     /// Nowhere: the lane is not used.
     Nothing,
-    /// To the group that holds its children, so many groups further on.
+    /// To the group that holds its children, which is this many groups further on.
     Inner(u32),
     /// It is an emitter, by number.
     Emitter(u32),
-    /// It stands for a whole tree that is put somewhere: by row of the instances.
+    /// It stands for an instance of a whole tree, by the instance's row.
     Instance(u32),
 }
 
@@ -74,8 +74,8 @@ const AXIS_STEPS: f32 = 32767.0;
 const THETA_O_STEPS: f64 = 32767.0;
 /// `sqrt(1 - cos theta_e)` in `[0, 1]` takes eight, likewise.
 const THETA_E_STEPS: f64 = 255.0;
-/// Forgiven when an angle is rounded up, relative: what `f32` loses between decoding and encoding
-/// again, which must not widen a cone. Far below the slack that importance grants.
+/// An angle is multiplied by this before it is rounded up. It makes up for what `f32` loses between
+/// decoding and encoding again, which must not widen a cone. Far below the slack that importance allows.
 const ANGLE_FORGIVEN: f64 = 1.0 - 4e-7;
 
 impl Node {
@@ -85,7 +85,7 @@ impl Node {
         let (half_extent, half_exponent) = encode_half_extent(&bounds.aabb, center);
         let axis = encode_axis(bounds.cone.axis);
         let tilt = between(Vec3::from_array(decode_axis(axis)).normalize(), bounds.cone.axis);
-        // `between` of equal vectors is exactly 0, so an axis that survives costs no widening.
+        // `between` of equal vectors is exactly 0, so an axis that is encoded exactly widens nothing.
         let theta_o = (sin_half(bounds.cone.theta_o + tilt) * THETA_O_STEPS).ceil();
         let theta_e = (2f64.sqrt() * sin_half(bounds.cone.theta_e) * THETA_E_STEPS).ceil();
         let two_sided = if bounds.cone.two_sided { TWO_SIDED_BIT } else { 0 };
@@ -102,7 +102,7 @@ impl Node {
         }
     }
 
-    /// The bounds as sampling sees them: those that were encoded, and a little more.
+    /// The decoded bounds, as sampling sees them. They contain those that were encoded.
     pub fn bounds(&self) -> LightBounds {
         let (center, half) = (self.center().as_dvec3(), self.half_extent().as_dvec3());
         let angle = |sin_half: f64| (2.0 * sin_half.min(1.0).asin()) as f32;
@@ -162,7 +162,7 @@ impl Node {
         }
     }
 
-    /// The first rule that a node breaks whatever its neighbours.
+    /// The first rule that the node breaks by itself, whatever the other nodes are.
     pub(super) fn broken_rule(&self) -> Option<Rule> {
         if !self.center().is_finite() || !self.half_extent().is_finite() {
             Some(rules::BOX_IS_FINITE)
@@ -186,11 +186,11 @@ impl Node {
     }
 }
 
-/// Angles may differ by the rounding of their own computation.
+/// Rounding error of a computed angle, radians.
 const ANGLE_TOLERANCE: f64 = 5e-6;
 
 impl Node {
-    /// The rule that is broken where something of a child sticks out of this node.
+    /// The rule that is broken if this node does not contain a child; `None` if it does.
     pub(super) fn uncontained(&self, child: &Node) -> Option<Rule> {
         let apart = (self.center().as_dvec3() - child.center().as_dvec3()).abs();
         let reach = apart + child.half_extent().as_dvec3();
@@ -225,8 +225,8 @@ impl Node {
 }
 
 impl Node {
-    /// The first part in which another node differs, bit by bit and whatever both lead to, in words;
-    /// `None` if they bound the same.
+    /// The first part, in words, in which the bits of another node differ; `None` if none does. Links
+    /// are not compared.
     pub fn difference(&self, other: &Node) -> Option<&'static str> {
         let [own, other] = [self, other];
         let box_of =
@@ -310,13 +310,13 @@ pub(super) fn decode_cos_theta_e(code: u8) -> f32 {
     1.0 - root * root
 }
 
-/// Steps of a range in an octave.
+/// Codes per octave of range.
 const RANGE_STEPS: f32 = 4.0;
 /// Base-2 logarithm of the range, in metres, of code 1.
 const SHORTEST_RANGE: f32 = -31.75;
 
-/// The smallest code whose range is at least this; 0 for a range without end, or beyond the largest
-/// code (3.6e9 m).
+/// The smallest code whose range is at least this; 0 for a range that is infinite, or beyond that of
+/// the largest code (3.6e9 m).
 fn encode_range(range_m: f32) -> u8 {
     let estimate = ((range_m.log2() - SHORTEST_RANGE) * RANGE_STEPS).floor().clamp(0.0, 255.0);
     let mut code = (estimate as u8).max(1);
@@ -334,13 +334,13 @@ fn decode_range(code: u8) -> f32 {
     }
 }
 
-/// 1/m^2, by code.
+/// `1 / range^2` by code, 1/m^2.
 static INVERSE_RANGE2: LazyLock<[f32; 256]> =
     LazyLock::new(|| std::array::from_fn(|code| decode_range(code as u8).powi(-2)));
 
 #[inline(always)]
 pub(super) fn decode_inverse_range2(code: u8) -> f32 {
-    // Most scenes have no ranges, and their nodes no table.
+    // Most scenes have no ranges: then the table is not read.
     if code == 0 { 0.0 } else { INVERSE_RANGE2[code as usize] }
 }
 
@@ -355,7 +355,7 @@ fn sign(v: Vec2) -> Vec2 {
     Vec2::new(1f32.copysign(v.x), 1f32.copysign(v.y))
 }
 
-/// The largest `f32`s that are not above.
+/// For each component the largest `f32` that is not above it.
 fn round_down(exact: DVec3) -> Vec3 {
     Vec3::from_array(exact.to_array().map(|exact| {
         let rounded = exact as f32;

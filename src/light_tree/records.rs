@@ -41,9 +41,10 @@ pub struct TreeRow {
 pub enum TreeKind {
     /// One light, in its own space: shared by its instances, or carried along, or forced.
     Shared = 0,
-    /// All that stands still. At most one.
+    /// All lights that stand still. A file has at most one such tree.
     Still = 1,
-    /// All that changes as it is in one frame, above the tree of what stands still.
+    /// All lights that change, as they are in one frame. A leaf stands for the tree of what stands still,
+    /// if there is one.
     Frame = 2,
 }
 
@@ -56,11 +57,11 @@ impl TreeKind {
     }
 }
 
-/// A tree put somewhere: what a leaf that is no emitter stands for.
+/// A tree placed in the scene. A leaf that is not an emitter stands for one.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
 pub struct InstanceRow {
-    /// From the space around it, world space, into the tree's own.
+    /// From world space into the tree's own.
     pub to_local: Similarity,
     /// Row of the tree.
     pub tree: u32,
@@ -101,7 +102,7 @@ pub struct LightRow {
     pub path_offset: u32,
     /// Length of its path in bytes.
     pub path_length: u32,
-    /// Energy of its emitters, summed (of a light that changes in its first frame).
+    /// Energy of its emitters, summed; in its first frame if the light changes.
     pub energy: f32,
     /// Sum of [`CHANGES`](LightRow::CHANGES), [`PLACED`](LightRow::PLACED) and
     /// [`FORCED`](LightRow::FORCED).
@@ -110,12 +111,12 @@ pub struct LightRow {
     pub look: LightLook,
 }
 
-/// What a light looks like (one that changes: in its first frame), for people who compare files. No
+/// What a light looks like, for people who compare files; in its first frame if the light changes. No
 /// tree depends on it, so it is not in the fingerprint.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Pod, Zeroable)]
 #[repr(C)]
 pub struct LightLook {
-    /// 0 not told; else one of [`MESH`](LightLook::MESH), [`POINT`](LightLook::POINT),
+    /// 0 if unknown; else one of [`MESH`](LightLook::MESH), [`POINT`](LightLook::POINT),
     /// [`SPOT`](LightLook::SPOT) and [`SPHERE`](LightLook::SPHERE).
     pub kind: u16,
     /// Its hue, linear Rec. 709 times 65535, the largest component 65535; zero if it is dark.
@@ -153,11 +154,11 @@ impl LightLook {
 }
 
 impl LightRow {
-    /// It moves or its brightness does: frames have trees of their own for it.
+    /// It moves or its brightness changes: frames have trees of their own for it.
     pub const CHANGES: u32 = 2;
     /// Its emitters are in a shared tree, which an instance places.
     pub const PLACED: u32 = 1;
-    /// It is in no tree but its own, and sampled always.
+    /// It is in no tree but its own and is always sampled.
     pub const FORCED: u32 = 4;
 
     /// Whether its class has a property.

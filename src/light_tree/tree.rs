@@ -1,4 +1,4 @@
-//! A light tree file, opened: the same type over bytes just built and bytes just mapped.
+//! An open light tree file. One type serves bytes that were just built and bytes mapped from a file.
 
 use super::group::Group;
 use super::records::{
@@ -11,9 +11,9 @@ use std::sync::OnceLock;
 
 /// The light trees of a shot, viewed in the bytes of their file.
 ///
-/// [`open`](LightTree::open) looks at the header alone; [`verify`](LightTree::verify) proves the
-/// rest. Sampling an unverified tree may give wrong numbers, but it ends, stays inside the bytes and
-/// does not panic; nothing shines in one whose links do not form trees.
+/// [`open`](LightTree::open) checks only the header and the section table;
+/// [`verify`](LightTree::verify) proves the rest. Sampling an unverified tree may give wrong numbers,
+/// but it ends, stays inside the bytes and does not panic. A file whose links do not form trees is dark.
 pub struct LightTree<D> {
     container: Container<D>,
     trees: Range<usize>,
@@ -25,7 +25,7 @@ pub struct LightTree<D> {
     paths: Range<usize>,
     textures: Option<Range<usize>>,
     means: Option<Range<usize>>,
-    /// Whether walks end soon, once that is known.
+    /// Whether every walk ends in reasonable time, once that is known.
     walkable: OnceLock<bool>,
 }
 
@@ -58,7 +58,7 @@ impl<D: AsRef<[u8]>> LightTree<D> {
         })
     }
 
-    /// The same over a view of its bytes.
+    /// The same file over borrowed bytes.
     pub fn by_reference(&self) -> LightTree<&[u8]> {
         LightTree {
             container: self.container.by_reference(),
@@ -95,7 +95,7 @@ impl<D: AsRef<[u8]>> LightTree<D> {
         self.container.view(&self.groups)
     }
 
-    /// Trees put somewhere.
+    /// The instances: trees placed in the scene.
     pub fn instances(&self) -> &[InstanceRow] {
         self.instances.as_ref().map_or(&[], |range| self.container.view(range))
     }
@@ -121,12 +121,12 @@ impl<D: AsRef<[u8]>> LightTree<D> {
         self.container.view(&self.lights)
     }
 
-    /// The prim path of a light; empty if its row lies.
+    /// The prim path of a light; empty if its row does not point to text inside the paths.
     pub fn light_path(&self, light: &LightRow) -> &str {
         std::str::from_utf8(self.path_bytes(light)).unwrap_or_default()
     }
 
-    /// The same as bytes, which order as the text does.
+    /// The same as bytes, which sort as the text does.
     pub(super) fn path_bytes(&self, light: &LightRow) -> &[u8] {
         let paths: &[u8] = self.container.view(&self.paths);
         let (start, length) = (light.path_offset as usize, light.path_length as usize);
@@ -180,13 +180,13 @@ impl<D: AsRef<[u8]>> LightTree<D> {
         self.container.bytes().len()
     }
 
-    /// Whether it was written in a later version than this program's, in which spare bytes may say
-    /// something.
+    /// Whether the file has a later minor version than this program's, in which spare bytes may have a
+    /// meaning.
     pub(super) fn is_of_later_version(&self) -> bool {
         self.container.minor_version() > store::VERSION.1
     }
 
-    /// Notes what has been proved: that walks end.
+    /// Notes that walks have been proved to end.
     pub(super) fn note_walkable(&self) {
         self.walkable.get_or_init(|| true);
     }

@@ -1,15 +1,15 @@
-//! The same code for wider vector registers, where the processor has them.
+//! The same code compiled for wider vector registers, used where the processor has them.
 //!
-//! Programs are compiled for any x86-64, whose registers hold four numbers; the eight lanes of a group
-//! fit one of AVX2's. Only the width differs: no fused multiply-add, which rounds once instead of
-//! twice, so a picture does not depend on the machine. `cargo bench` shows what it is worth.
+//! Programs are compiled for any x86-64, whose registers hold four `f32`. AVX2's hold the eight lanes
+//! of a group. Only the width differs. There is no fused multiply-add, which rounds once instead of
+//! twice, so a picture does not depend on the machine. `cargo bench` shows the gain.
 
 #![allow(unsafe_code)]
 
 use super::group::{Group, WIDTH};
 use super::viewer::Viewer;
 
-/// Weighs a group with the widest registers that there are.
+/// Weighs a group with the widest registers that the processor has.
 #[inline(always)]
 pub fn weigh(group: &Group, viewer: &impl Viewer) -> ([f64; WIDTH], [f32; WIDTH]) {
     #[cfg(target_arch = "x86_64")]

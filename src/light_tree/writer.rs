@@ -33,9 +33,9 @@ pub struct LightSummary {
 /// The lights of a file, in their order, and where each begins.
 pub struct LightList<'a> {
     pub(super) lights: &'a [LightSummary],
-    /// The first emitter of each, and the place of its path among all paths, bytes.
+    /// For each light its first emitter, and where its path begins among all paths, bytes.
     pub(super) starts: Vec<(u32, u32)>,
-    /// How long all paths are together, bytes.
+    /// Length of all paths together, bytes.
     path_length: usize,
 }
 
@@ -43,7 +43,7 @@ impl<'a> LightList<'a> {
     /// The list of some lights. Emitters are numbered in their order.
     pub fn new(lights: &'a [LightSummary]) -> LightList<'a> {
         let size = |light: &LightSummary| (light.emitter_count, light.path.len() as u32);
-        // Summaries are large: they are read side by side, then summed one by one.
+        // Summaries are large: their sizes are read in parallel, then summed one by one.
         let mut starts: Vec<_> = lights.par_iter().map(size).collect();
         let (mut next_emitter, mut path_length) = (0, 0_usize);
         for start in &mut starts {
@@ -96,14 +96,14 @@ pub struct LightTreeWriter<'a> {
 }
 
 impl<'a> LightTreeWriter<'a> {
-    /// A writer that takes over what has not changed from an earlier file. The bytes are the same as
-    /// without it.
+    /// A writer that copies whatever has not changed from an earlier file. It writes the same bytes as
+    /// it would without that file.
     pub fn upon(base: Base<'a>) -> LightTreeWriter<'a> {
         LightTreeWriter { base: Some(base), ..LightTreeWriter::default() }
     }
 
-    /// Whether the base was found to [contradict](Base::contradicts) the bounds so far. Then what was
-    /// built upon it is not to be used.
+    /// Whether the base was found to [contradict](Base::contradicts) the bounds so far. If so, what was
+    /// built upon it must not be used.
     pub fn base_contradicts(&self) -> bool {
         self.base.as_ref().is_some_and(Base::contradicts)
     }
@@ -149,9 +149,9 @@ impl<'a> LightTreeWriter<'a> {
         Some(self.trees.len() as u32 - 1)
     }
 
-    /// Adds the `nth` tree of its own that a light has in the base, and returns its row; `None` if the
-    /// light, which has these bounds now, has changed. The light is named by its place among those of
-    /// the new file.
+    /// Copies the `nth` tree that a light has for itself in the base, and returns its row; `None` if the
+    /// light has changed. `light` is the light's place among those of the new file, `bounds` are its
+    /// bounds now.
     pub fn add_tree_of_base(
         &mut self,
         light: usize,
@@ -210,12 +210,12 @@ impl<'a> LightTreeWriter<'a> {
         self.trees.len() as u32 - 1
     }
 
-    /// The bounds of a whole tree, as a leaf of another has them, in the tree's own space.
+    /// The bounds of a whole tree in its own space. A leaf that stands for the tree needs them.
     pub fn bounds_of(&self, tree: u32) -> LightBounds {
         self.trees[tree as usize].root.bounds()
     }
 
-    /// Puts a tree somewhere, its emitters numbered from `first_emitter` on; returns the row of the
+    /// Places a tree, its emitters numbered from `first_emitter` on; returns the row of the
     /// instance. `to_local` leads from world space to the tree's own.
     pub fn add_instance(&mut self, tree: u32, to_local: Similarity, first_emitter: u32) -> u32 {
         self.instances.push(InstanceRow { to_local, tree, first_emitter, reserved: [0; 2] });
@@ -268,7 +268,7 @@ impl<'a> LightTreeWriter<'a> {
         file.section_with(records::PATHS, true, lights.path_length, |place: &mut [u8]| {
             lights.write_paths(place);
         });
-        // Nobody needs them to sample the trees.
+        // Sampling the trees does not need them.
         if !self.textures.is_empty() {
             file.section(records::TEXTURES, false, &self.textures);
             file.section(records::MEANS, false, &self.means);

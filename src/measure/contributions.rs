@@ -7,7 +7,7 @@ use crate::render::path::{Integrator, Vertex};
 use glam::Vec2;
 use std::collections::HashMap;
 
-/// Points of an emitter that its contribution is averaged over: a square lattice.
+/// The contribution of an emitter is averaged over a square lattice with this many points along a side.
 const POINTS_ALONG: u32 = 3;
 
 /// Contributions to one point, by light.
@@ -16,18 +16,19 @@ pub struct Contributions {
     beside: Vec<Contribution>,
 }
 
-/// Of one light.
+/// The contribution of one light.
 #[derive(Clone, Copy, Debug, Default)]
 struct Contribution {
     /// Luminance that the point reflects of it.
     luminance: f32,
-    /// How many times as often reflected rays find it as samples of it do.
+    /// The BSDF's pdf over the pdf of a sample on the light; 0 if the light has no pdf.
     by_reflection: f32,
 }
 
 impl Contributions {
-    /// What a vertex reflects of each light that is not forced: from the middles of a lattice over each
-    /// emitter, and with `visibility` only if a ray to its middle finds it.
+    /// What a vertex reflects of each light that is not forced, averaged over the points of a lattice on
+    /// each. With `visibility`, one shadow ray goes to the first lattice point that the vertex receives
+    /// light from, and its transmittance scales the contribution.
     pub fn at(integrator: &Integrator, vertex: &Vertex, visibility: bool) -> Contributions {
         let emitters = integrator.picker.tree().unforced_count();
         let of = |light| contribution(integrator, vertex, light, visibility, POINTS_ALONG);
@@ -42,7 +43,8 @@ impl Contributions {
         }
     }
 
-    /// Of one light, that part which falls to picking it if it is expected to be picked so often.
+    /// The contribution of one light, times the weight of picking it against finding it by reflection
+    /// (power heuristic). `expected` is the expected number of picks of the light.
     pub fn of(&self, light: Picked, expected: f64) -> f64 {
         let Contribution { luminance, by_reflection } = match light {
             Picked::Emitter(emitter) => self.of_emitter[emitter as usize],
@@ -51,7 +53,7 @@ impl Contributions {
         f64::from(luminance) * f64::from(power_heuristic(expected as f32, by_reflection))
     }
 
-    /// Of all lights, however they are found.
+    /// The sum of all contributions, without weights.
     pub fn sum(&self) -> f64 {
         let all = self.of_emitter.iter().chain(&self.beside);
         all.map(|light| f64::from(light.luminance)).sum()
@@ -128,7 +130,7 @@ fn contribution(
     sum
 }
 
-/// Importances by light, as an exhaustive strategy would use them.
+/// The probability of each light if picks are proportional to these importances.
 pub fn shares(importances: Vec<(Picked, f64)>) -> HashMap<Picked, f64> {
     let total: f64 = importances.iter().map(|(_, importance)| importance).sum();
     importances.into_iter().map(|(light, importance)| (light, importance / total)).collect()

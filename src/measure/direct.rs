@@ -1,8 +1,7 @@
 //! Direct light in a coarse picture, without noise.
 //!
-//! At one point of each pixel all lights are enumerated, as for the [probes](super::at_probes). The
-//! same pixel of two versions of a scene has the same ray, so what differs between their pictures is
-//! what changed.
+//! All lights are enumerated at one point of each pixel, as for the [probes](super::at_probes). A pixel
+//! has the same ray in two versions of a scene, so their pictures differ only by what changed.
 
 use super::contributions::reflected;
 use crate::light_tree::{NoSuchFrame, Picked};
@@ -10,12 +9,12 @@ use crate::render::RenderDelegate;
 use crate::render::path::{Integrator, Vertex};
 use rayon::prelude::*;
 
-/// Points of a dome, or of a sun, along a square lattice over it. Of an emitter the middle will do.
+/// Points along a side of the square lattice over a dome or a sun. An emitter has one, its middle.
 const POINTS_AT_INFINITY: u32 = 8;
 
-/// What the first surface behind each pixel of a delegate's picture reflects of all lights, as
-/// luminance in nits, row after row; `None` where no surface is that reflects. What stands in a light's
-/// way counts only with `visibility`, by a ray to the middle of each emitter.
+/// The luminance, in nits, that the first surface behind each pixel of a delegate's picture reflects of
+/// all lights, row after row. `None` where there is no surface that reflects. With `visibility`, there
+/// are shadows: one ray goes to the middle of each emitter, and one to a point of each infinite light.
 ///
 /// # Errors
 /// If the tree lacks the frame.

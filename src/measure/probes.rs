@@ -1,10 +1,10 @@
 //! Exact variance at points that camera paths visit.
 //!
-//! At each point all lights are enumerated, and the variance of each strategy's estimate of the
-//! light that they reflect there follows in closed form. It is the variance that comes from *which*
-//! lights are picked: what comes from where on a light a sample falls is left out, and so is shadow
-//! unless it is asked for. Light that reflected rays find is left to them, by the weights that a
-//! render has. The ideal is 0.
+//! All lights are enumerated at each point, and the variance of each strategy's estimate of the light
+//! reflected there follows in closed form. It is the variance from *which* lights are picked. The
+//! variance from where on a light a sample falls is left out, and shadows are left out unless they are
+//! asked for. Contributions have the multiple importance sampling weights that a render gives them, so
+//! the part that is left to reflected rays does not count. The ideal is 0.
 
 use super::contributions::{Contributions, shares};
 use crate::light_tree::NoSuchFrame;
@@ -23,11 +23,11 @@ pub struct ProbeOptions {
     pub probes: u32,
     /// Whether lights that cannot be seen from a point contribute nothing.
     pub visibility: bool,
-    /// Knobs of splitting to measure the tree with; each by both tests.
+    /// Knobs of splitting to measure the tree with; each is measured with both splitting tests.
     pub knobs: Vec<f32>,
-    /// At most so many lights at a point.
+    /// Lights sampled at a point, at most.
     pub max_lights: u32,
-    /// Another seed, other points.
+    /// The seed that chooses the points.
     pub seed: u32,
 }
 
@@ -57,7 +57,8 @@ pub struct StrategyReport {
     pub median: f64,
     /// Nine points in ten have less.
     pub ninth_decile: f64,
-    /// The mean times lights sampled: variance that one sample would have if samples were alike.
+    /// The mean relative variance times the mean number of lights sampled: the variance of one sample if
+    /// samples were independent and identically distributed.
     pub variance_times_lights: f64,
     /// Lights sampled at a point, in the mean.
     pub lights: f64,
@@ -120,8 +121,8 @@ fn report(integrator: &Integrator, options: &ProbeOptions) -> ProbeReport {
     }
 }
 
-/// A point that camera paths visit, one of so many: at the first hit of a path, or, every other one,
-/// after a bounce. `None` if the path hits nothing that reflects.
+/// Point `number` of `of` points that camera paths visit. Even numbers are at the first hit of a path,
+/// odd ones after one bounce. `None` if the path hits nothing that reflects.
 pub fn visited(integrator: &Integrator, number: u32, of: u32, seed: u32) -> Option<Vertex> {
     // Spread over the picture by a lattice of rank 1.
     let (width, height) = (integrator.settings.width, integrator.settings.height);
@@ -178,7 +179,7 @@ fn of_strategy(
     }
 }
 
-/// Variance of the estimate, and how many lights it takes.
+/// The variance of the estimate, and the expected number of lights that it samples.
 fn of_probe(picker: &LightPicker, strategy: LightStrategy, probe: &Probe) -> (f64, f64) {
     let wanted = &probe.wanted;
     match strategy {

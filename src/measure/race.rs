@@ -1,9 +1,9 @@
-//! Settings against each other: what each takes to get how close.
+//! Compares settings by the time that each takes to reach the same error.
 //!
-//! Every entrant renders the same frame several times with other seeds. All pictures have the same
-//! mean, so the spread between them is the error, without any reference; and the time to reach
-//! another's error follows, since error times time stays the same as samples are added (stratified
-//! samples do better than that, so entrants are best given about the samples that they need).
+//! Every entrant renders the same frame several times with different seeds. All pictures have the same
+//! expectation, so the variance between them is the error, and no reference is needed. The time to reach
+//! another entrant's error follows, because error times time is constant as samples are added. Stratified
+//! samples do better than that, so each entrant should get about as many samples as it needs.
 
 use crate::light_tree::NoSuchFrame;
 use crate::math::color::luminance;
@@ -11,7 +11,7 @@ use crate::render::{RenderDelegate, RenderSettings};
 use serde::Serialize;
 use std::time::Instant;
 
-/// One that takes part.
+/// Settings that take part in a race.
 #[derive(Clone, Debug)]
 pub struct Entrant {
     /// What it is called.
@@ -29,18 +29,19 @@ pub struct RaceOptions {
     pub pictures: u32,
 }
 
-/// How one did.
+/// The result of one entrant.
 #[derive(Clone, Debug, Serialize)]
 pub struct Result {
     /// What it is called.
     pub name: String,
     /// Seconds for a picture, the median.
     pub seconds: f64,
-    /// Mean over the pixels of variance over squared luminance (and a hundredth of the mean's).
+    /// The variance of a pixel over its squared luminance, in the mean over the pixels. The square of a
+    /// hundredth of the picture's mean luminance is added to the denominator.
     pub error: f64,
-    /// Seconds that it would take to the error of the first.
+    /// Seconds that it would take to reach the error of the first entrant.
     pub seconds_to_error_of_first: f64,
-    /// The picture's mean luminance, which all should agree in.
+    /// The picture's mean luminance. All entrants should agree in it.
     pub mean: f64,
     /// Lights sampled for a path, in the mean.
     pub lights: f64,

@@ -1,9 +1,10 @@
-//! Floor 1: pages for people, tables and pictures in one HTML file, and nothing of what they show.
+//! Floor 1: pages for people, with tables and pictures in one HTML file. The module knows nothing of
+//! lights or trees.
 //!
-//! A [`Page`] holds everything that it needs and asks the network for nothing; its own policy forbids
-//! it to. It follows the reader's choice of light or dark, prints, and says as much without scripts: they
-//! only sort tables and leaf through levels. Whatever text goes in, out comes that text and no markup.
-//! The same parts give the same bytes.
+//! A [`Page`] holds everything that it needs and loads nothing from the network; its content security
+//! policy forbids it. It follows the reader's choice of light or dark and can be printed. It is complete
+//! without scripts, which only sort tables and switch between levels. All text is escaped, so none of it
+//! becomes markup. The same parts give the same bytes.
 //!
 //! | file | what |
 //! |---|---|

@@ -39,7 +39,7 @@ pub(super) fn is_visible(char: char) -> bool {
     if char.is_ascii() {
         return matches!(char, ' '..='~');
     }
-    // `escape_debug` of a text spares what combines with the letter before, which accents need.
+    // `str::escape_debug` escapes no combining character after a letter, so accents stay as they are.
     let mut bytes = [b'a', 0, 0, 0, 0];
     let length = 1 + char.encode_utf8(&mut bytes[1..]).len();
     let pair = std::str::from_utf8(&bytes[..length]).unwrap_or_default();
@@ -69,8 +69,8 @@ impl<W: Write> Write for Lines<W> {
     }
 }
 
-/// JSON text in which strings hold none but visible characters: the others are escaped as JSON
-/// escapes, so that it means the same.
+/// JSON text whose strings hold only visible characters. All others become JSON escapes, so the text
+/// keeps its meaning.
 pub fn plain_json(json: &str) -> String {
     let mut plain = String::with_capacity(json.len());
     for char in json.chars() {

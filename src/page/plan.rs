@@ -1,6 +1,6 @@
-//! Marks in space, as an architect draws them: the plan, from above, and below it the elevation,
-//! from the side that is at the plan's lower edge, in one scale and in line. What is longer than it is
-//! wide lies across.
+//! Marks in space, as an architect draws them: a plan from above, and below it an elevation, seen from
+//! the plan's lower edge. Both have one scale and are aligned. The longer horizontal side of the box
+//! runs across the page.
 
 use super::escape::Escaped;
 use super::shade::Shade;
@@ -38,7 +38,7 @@ pub struct Mark {
 pub struct Level {
     /// What they are.
     pub name: String,
-    /// They.
+    /// The boxes.
     pub boxes: Vec<Cuboid>,
 }
 
@@ -60,7 +60,7 @@ pub struct Plan {
 
 /// Radius of the heaviest mark, and of the lightest.
 const RADII: [f64; 2] = [11.0, 1.4];
-/// Marks cover no more of a picture than this, the lightest aside.
+/// The share of a picture that marks cover, at most; marks of the smallest radius may exceed it.
 const COVERED: f64 = 0.08;
 /// Side of a cell of the ground.
 const CELL: f64 = 2.0;
@@ -89,8 +89,8 @@ impl Plan {
         }
     }
 
-    /// Radius over the square root of a weight: the heaviest as large as may be, unless all together
-    /// would cover too much.
+    /// The radius of a mark over the square root of its weight. The heaviest mark has the largest radius
+    /// allowed, unless all marks together would cover too much.
     fn radius_per_root(&self) -> f64 {
         let weights = || self.marks.iter().map(|mark| f64::from(mark.weight));
         let most = weights().fold(f64::MIN_POSITIVE, f64::max);
@@ -113,7 +113,7 @@ impl Display for Plan {
              <svg viewBox=\"0 0 {WIDTH} {height:.1}\" role=\"img\" aria-label=\"{caption}\">"
         )?;
         let mut marks: Vec<&Mark> = self.marks.iter().collect();
-        // What is there and nothing more below, then the heaviest, so that they hide no other.
+        // Grey marks are drawn first and heavy ones before light ones, so that they hide no others.
         marks.sort_by(|a, b| {
             let is_quiet = |mark: &Mark| mark.ink == Ink::Grey;
             is_quiet(b).cmp(&is_quiet(a)).then(b.weight.total_cmp(&a.weight))

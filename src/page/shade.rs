@@ -10,9 +10,9 @@ pub struct Shade {
     sums: Vec<f64>,
 }
 
-/// Cells that weigh so much less than the heaviest are as faint as can be.
+/// Cells of at most this share of the heaviest cell's weight get the lowest opacity.
 const FAINTEST: f64 = 1e-4;
-/// Can be told from black and from white.
+/// A grey that stands out from black and from white.
 const COLOR: [u8; 3] = [128, 128, 128];
 
 impl Shade {
@@ -28,7 +28,7 @@ impl Shade {
         self.sums[cell(at[1], rows) * columns + cell(at[0], columns)] += weight;
     }
 
-    /// The more opaque the heavier, by the logarithm.
+    /// An image of the cells. The opacity grows with the logarithm of the weight; empty cells are clear.
     pub fn raster(&self) -> Raster {
         let most = self.sums.iter().fold(0.0, |a: f64, &b| a.max(b));
         let columns = self.columns as usize;

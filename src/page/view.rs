@@ -11,7 +11,7 @@ pub const LEFT: f64 = 56.0;
 const RIGHT: f64 = 8.0;
 const ABOVE: f64 = 26.0;
 const BELOW: f64 = 22.0;
-/// At most so high.
+/// The largest heights of the plan and of the elevation.
 const HEIGHTS: [f64; 2] = [520.0, 300.0];
 const LEAST_HEIGHT: f64 = 60.0;
 
@@ -81,7 +81,7 @@ impl View {
         self.top + self.height + BELOW
     }
 
-    /// How far down something is that is so far along.
+    /// The y coordinate in the drawing of a distance along the vertical axis.
     fn down(&self, along: f64) -> f64 {
         if self.goes_up { self.top + self.height - along } else { self.top + along }
     }

@@ -1,10 +1,10 @@
-//! Whether a tree says of its lights what their scene gives.
+//! Whether a tree agrees with its scene about the lights.
 //!
-//! `verify` proves of a tree alone that clusters bound their leaves. That the leaves bound the
-//! emitters, only the scene can show: here each leaf is held, bit by bit, against the bounds that it
-//! must have been built from. Together both prove that no light is called dark that is not. What
-//! neither proves is that the tree is as good as a build's: clusters may be wider than they need be,
-//! or badly cut, which makes pictures noisier and not wrong.
+//! `verify` proves from the file alone that clusters bound their leaves. Only the scene can show that the
+//! leaves bound the emitters: this module compares each leaf, bit by bit, with the bounds that it must
+//! have been built from. Both together prove that the tree takes no light for dark that is not. Neither
+//! proves that the tree is as good as a new build: clusters may be wider than necessary or badly split,
+//! which makes pictures noisier but not wrong.
 
 use super::build::in_world;
 use super::survey::{Group, PlacedLight, Survey};
@@ -14,12 +14,12 @@ use crate::light_tree::{LightList, LightRow, LightTree, Link, Node, TreeKind, Tr
 use rayon::prelude::*;
 use std::fmt;
 
-/// Something that a tree says of a light and its scene does not.
+/// A difference between a tree and its scene, mostly about one light.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Contradiction {
-    /// Prim path of the light; empty if it is about no light.
+    /// Prim path of the light; empty if it is about no single light.
     pub path: String,
-    /// What of it, in words.
+    /// What differs, in words.
     pub what: &'static str,
 }
 
@@ -33,18 +33,18 @@ impl fmt::Display for Contradiction {
     }
 }
 
-/// What a tree file is to a scene.
+/// How a tree file relates to a scene.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Standing {
-    /// What a build would write, as far as a comparison can tell.
+    /// It is what a build would write, as far as a comparison can tell.
     UpToDate,
-    /// Of another scene, or an earlier version of it; or without what a build would add.
+    /// It belongs to another scene or an earlier version of this one, or lacks what a build would add.
     OutOfDate,
-    /// Of this scene, and yet it says something else of a light.
+    /// It has the scene's fingerprint, but differs from the scene.
     Contradicts(Contradiction),
 }
 
-/// What a tree file, which must have been verified, is to a scene that was surveyed.
+/// How a tree file, which must have been verified, relates to a surveyed scene.
 pub fn standing<D: AsRef<[u8]> + Sync>(tree: &LightTree<D>, survey: &Survey) -> Standing {
     if tree.fingerprint() != survey.fingerprint {
         return Standing::OutOfDate;
@@ -56,9 +56,8 @@ pub fn standing<D: AsRef<[u8]> + Sync>(tree: &LightTree<D>, survey: &Survey) -> 
     }
 }
 
-/// The first thing that a tree with the fingerprint of a survey says and the survey does not: of the
-/// rows of lights, and of the means of textures if the file has any; with `leaves`, also of all
-/// leaves.
+/// The first difference between a tree and the survey whose fingerprint it has. Compares the rows of
+/// lights and, if the file has any, the means of textures; with `leaves`, also all leaves.
 pub(super) fn find_contradiction<D: AsRef<[u8]> + Sync>(
     tree: &LightTree<D>,
     survey: &Survey,
@@ -170,7 +169,7 @@ impl<D: AsRef<[u8]> + Sync> Agreement<'_, D> {
         of_row.or_else(|| self.of_forced(forced, [&self.survey.still, group].into_iter()))
     }
 
-    /// A tree over what is sampled together, and perhaps the tree of what stands still.
+    /// The tree over a group. `below` is 1 if the tree of what stands still is one of its leaves, else 0.
     fn of_group(&self, row: &TreeRow, group: &Group, below: usize) -> Option<Contradiction> {
         let count = group.flat.len() + group.placed.len() + below;
         let bounds_of = |link| match link {
@@ -202,7 +201,7 @@ impl<D: AsRef<[u8]> + Sync> Agreement<'_, D> {
         self.of_leaves(row, count, bounds_of, light_of)
     }
 
-    /// The leaves of a tree, of which there must be so many.
+    /// The leaves of a tree; there must be `count` of them.
     fn of_leaves(
         &self,
         row: &TreeRow,

@@ -21,8 +21,8 @@ pub struct Rebuilt {
     pub leaves: usize,
     /// How many of them were taken over from the base.
     pub reused: usize,
-    /// Whether the base says of lights that have not changed what the scene does not give. Then
-    /// nothing of it was taken over.
+    /// Whether the base contradicts the scene about lights that have not changed. If so, nothing of it was
+    /// taken over.
     pub base_contradicts: bool,
 }
 
@@ -79,7 +79,7 @@ fn write(survey: &Survey, lights: &LightList, writer: LightTreeWriter) -> Rebuil
     Rebuilt { bytes, leaves, reused, base_contradicts }
 }
 
-/// Under which name `META` has the version of the algorithm.
+/// The key in `META` of the algorithm's version.
 const ALGORITHM: &str = "algorithmVersion";
 
 /// The version of the algorithm that a file was built by, if it says so.
@@ -88,10 +88,10 @@ pub(super) fn algorithm_of<D: AsRef<[u8]>>(tree: &LightTree<D>) -> Option<u32> {
     meta[ALGORITHM].as_u64()?.try_into().ok()
 }
 
-/// Under which name `META` has the origin.
+/// The key in `META` of the origin.
 const ORIGIN: &str = "origin";
 
-/// What is added to every position of a file to get that in the scene's world, metres.
+/// The offset from positions in a file to those in the scene's world, metres.
 pub fn origin_of<D: AsRef<[u8]>>(tree: &LightTree<D>) -> DVec3 {
     let meta: serde_json::Value = serde_json::from_str(tree.meta()).unwrap_or_default();
     let origin = [0, 1, 2].map(|axis| meta[ORIGIN][axis].as_f64().unwrap_or(0.0));
@@ -167,7 +167,7 @@ impl Builder<'_> {
         }
     }
 
-    /// What the leaves of a group stand for; and one for the tree below, if there is one.
+    /// The links of a group's leaves, and of the tree below if there is one.
     fn links(&mut self, group: &Group, below: Option<&(Link, LightBounds)>) -> Vec<Link> {
         let flat = (group.first..).take(group.flat.len()).map(Link::Emitter);
         let mut links: Vec<Link> = flat.collect();
@@ -176,7 +176,7 @@ impl Builder<'_> {
         links
     }
 
-    /// Their bounds.
+    /// The bounds of the leaves, in the order of their links.
     fn bounds<'g>(
         &self,
         group: &'g Group,
@@ -211,7 +211,7 @@ fn stand_alike(a: &Group, b: &Group) -> bool {
         && a.placed.iter().map(dull).eq(b.placed.iter().map(dull))
 }
 
-/// The bounds of a tree in its own space as they are in world space, a little wider.
+/// The bounds of a tree, taken from its own space to world space and widened a little against rounding.
 pub(super) fn in_world(own: &LightBounds, placed: &PlacedLight) -> LightBounds {
     /// What rounding may turn an axis by, radians.
     const TURN: f32 = 1e-6;

@@ -1,4 +1,4 @@
-//! Which frames a shot has, where nobody says; and how to say it.
+//! The frames of a shot when the user names none, and how frames are written.
 
 use crate::scene::{Channel, Keys, Scene};
 
@@ -19,10 +19,10 @@ pub fn frames_of(scene: &Scene) -> Vec<i32> {
         f64::from(last_s)
     };
     let last_s = timeline.last_frame.map_or_else(last_key, |frame| timeline.seconds_at(frame));
-    // A 32-bit time a hair beyond a frame is that of the frame, and no reason for one more.
+    // A 32-bit time may be a hair beyond its frame; that does not add another frame.
     let last = timeline.frame_at(last_s);
     let first = timeline.first_frame.round() as i32;
-    // A clock that runs for years is a slip of the exporter; let the user say what is meant.
+    // A shot longer than this is taken for an exporter's error; the user can still name its frames.
     let last = (last.ceil() as i32).clamp(first, first.saturating_add(100_000));
     (first..=last).collect()
 }

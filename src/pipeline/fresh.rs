@@ -43,7 +43,7 @@ pub enum TreeError {
         /// What changed.
         cause: StaleTree,
     },
-    /// It says something of a light that the scene does not.
+    /// It differs from the scene although it has the scene's fingerprint.
     #[error(
         "{}: contradicts the scene: {cause}. It keeps the rules of the format, but was not built from the scene as it is. Build it again: {remedy}",
         path.display()
@@ -135,7 +135,7 @@ pub struct StaleTree {
     pub added: Vec<String>,
     /// Lights that the scene does not have.
     pub removed: Vec<String>,
-    /// Lights that are not what they were.
+    /// Lights that have changed.
     pub dirtied: Vec<String>,
     /// The command that builds it again, as a shell takes it.
     pub remedy: String,
@@ -169,13 +169,13 @@ impl fmt::Display for StaleTree {
 
 impl std::error::Error for StaleTree {}
 
-/// Compares a tree with the scene it should belong to. `forced` are the paths that the user wants
-/// forced besides what the scene itself forces: part of the command that a stale tree is mended by.
-/// With `leaves`, each leaf is held against its emitter: the tree must have been verified.
+/// Compares a tree with the scene it should belong to. `forced` are the paths that the user forces in
+/// addition to those that the scene forces; the error's build command repeats them. With `leaves`, each
+/// leaf is compared with its emitter, and the tree must have been verified.
 ///
 /// # Errors
 /// [`TreeError::Stale`] with the lights that changed, at most ten of them named in the message;
-/// [`TreeError::Contradicts`] if the tree has the scene's fingerprint and says something else.
+/// [`TreeError::Contradicts`] if the tree has the scene's fingerprint but differs from the scene.
 pub fn check_fresh<D: AsRef<[u8]> + Sync>(
     tree: &LightTree<D>,
     path: &Path,
@@ -194,8 +194,8 @@ pub fn check_fresh<D: AsRef<[u8]> + Sync>(
     check_agreement(tree, path, scene, &survey, forced, leaves)
 }
 
-/// Refuses a tree that has the fingerprint of a survey and says something else than the survey. What
-/// is of another content is let pass.
+/// Refuses a tree that has a survey's fingerprint but contradicts the survey. A tree with another
+/// fingerprint passes.
 ///
 /// # Errors
 /// [`TreeError::Contradicts`].

@@ -3,9 +3,9 @@
 use crate::scene::{Camera, Channel, Interpolation, Keys, Node, Scene, Timeline};
 use std::ops::Mul;
 
-/// Adds a camera's node and all above it to another scene, and returns the camera there. It stands at
-/// every frame where it stood, whatever seconds the two scenes give to a frame; and the other scene has
-/// no more frames than before.
+/// Adds a camera's node and all above it to another scene, and returns the camera there. At every frame
+/// the camera is where it was in its own scene, even if the two scenes time their frames differently. The
+/// other scene keeps its frames.
 pub fn carry_camera(from: &Scene, camera: &Camera, into: &mut Scene) -> Camera {
     let frames = super::frames_of(into);
     into.timeline.last_frame = frames.last().map(|&last| f64::from(last));

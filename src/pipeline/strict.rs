@@ -1,4 +1,4 @@
-//! Notes that a user does not put up with.
+//! Notes that the user wants treated as errors.
 
 use crate::scene::{Category, Scene};
 use std::path::PathBuf;

@@ -39,20 +39,20 @@ pub struct SharedBounds {
     fingerprint: [u8; 32],
 }
 
-/// What is sampled together.
+/// Lights that are sampled together.
 #[derive(Default)]
 pub struct Group {
     /// The number of the first emitter that has a leaf of its own.
     pub first: u32,
     /// Bounds of those emitters, world space.
     pub flat: Vec<LightBounds>,
-    /// Trees that are put somewhere.
+    /// Lights with trees of their own.
     pub placed: Vec<PlacedLight>,
-    /// Trees of forced lights.
+    /// Forced lights, which also have trees of their own.
     pub forced: Vec<PlacedLight>,
 }
 
-/// A tree of its own, put somewhere.
+/// A light with a tree of its own, and where that tree is placed.
 #[derive(Clone, Copy, PartialEq)]
 pub struct PlacedLight {
     /// Row of [`Survey::shared`].
@@ -86,7 +86,7 @@ pub fn survey(scene: &Scene, emitters: &Emitters, frames: &[i32]) -> Result<Surv
         .collect::<Result<Vec<_>, LightOverflow>>()?;
     let shared = surveyor.shared;
     check_total(emitters, &shared, &still, &frames)?;
-    // What changes looks as it does in the first frame.
+    // The look of a changing light is that in the first frame.
     let pose = frames.first().map_or(&pose, |(frame, _)| posing.at_frame(*frame));
     let looks = looks(&PosedEmitters { scene, emitters, pose });
     let lights = summaries(scene, emitters, &looks, &shared, &still, &frames);
@@ -173,7 +173,7 @@ fn energy_of(placed: &PlacedLight, shared: &[SharedBounds]) -> f64 {
     shared[placed.shared as usize].energy * f64::from(placed.brightness)
 }
 
-/// Clusters hold the sum of their energies: that of a whole frame must be a number too.
+/// Clusters store the sum of their leaves' energies, so the sum over a whole frame must fit into `f32`.
 fn check_total(
     emitters: &Emitters,
     shared: &[SharedBounds],

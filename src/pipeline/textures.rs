@@ -5,9 +5,9 @@ use crate::light_tree::{LightTree, MeanRow};
 use crate::math::color::Rgb;
 use crate::scene::Scene;
 
-/// The emitters of a scene. What emission textures give their triangles is taken from a tree file
-/// as far as it has that, by the fingerprint of all that it depends on; the rest is worked out, and
-/// `watch` is told how many triangles are done, of how many.
+/// The emitters of a scene. The means of emission textures over triangles are looked up in a tree file by
+/// the fingerprint of all that they depend on. Those that it lacks are computed, and `watch` is told how
+/// many triangles are done, of how many.
 pub fn collect_emitters<D: AsRef<[u8]> + Sync>(
     scene: &Scene,
     tree: Option<&LightTree<D>>,

@@ -1,9 +1,9 @@
 //! The view of a scene that a user means.
 //!
 //! Both programs take the same options, [`View`], and [`look`] finds the camera that they mean: one of
-//! the scene's own, one of another file, one that stands where the options say, or, where there is none,
-//! one that has the whole scene in view. Cameras stand at nodes, so one that is not the scene's own gets
-//! nodes that are added to the scene. No light stands there, and a tree of the scene stays fresh.
+//! the scene, one of another file, or one placed by the options. A scene without a camera gets one that
+//! has the whole scene in view. A camera needs a node, so for one that is not the scene's own nodes are
+//! added to the scene. These carry no lights, and a tree of the scene stays fresh.
 
 use super::fit::{self, Fitted};
 use super::{carry_camera, load_scene, option};
@@ -93,7 +93,7 @@ impl ViewError {
 }
 
 impl View {
-    /// Whether it is left to the scenes that are looked at.
+    /// Whether no option is given, so that the scenes decide.
     pub fn is_default(&self) -> bool {
         *self == View::default()
     }
@@ -173,8 +173,8 @@ fn file_of(text: &str) -> Option<(&Path, Option<&str>)> {
     ends.filter_map(|end| Some((Path::new(&text[..end]), camera(end)?))).next()
 }
 
-/// Adds a node that stands at a point and looks at another. Without a direction that is up, +Y is,
-/// or, seen along it, the direction that a map's upper edge has: -Z.
+/// Adds a node that stands at a point and looks at another. If `up` is not given, +Y is up. For a view
+/// straight down it is -Z, as on a map, and for one straight up +Z.
 fn stand(
     scene: &mut Scene,
     from: DVec3,

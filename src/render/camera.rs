@@ -1,13 +1,13 @@
 //! Rays from a camera.
 //!
-//! A pixel is a box filter one pixel wide: its value is the mean over its own square, which is
-//! what a reference picture can be compared with. Pixel (0, 0) is the top left one. A render of
-//! another shape than the file asks for keeps the height: the vertical field of view of a
-//! perspective camera, the metres that an orthographic one sees.
+//! The pixel filter is a box one pixel wide: a pixel's value is the mean over its own square, so that it
+//! can be compared with a reference picture. Pixel (0, 0) is the top left one. A picture with another
+//! aspect than the camera's keeps the height that the camera sees: the vertical field of view of a
+//! perspective camera, the metres of an orthographic one.
 //!
-//! The rays of a perspective camera leave its lens. Those of an orthographic camera leave the plane
-//! through the camera, and what is behind that plane is not seen. Clipping planes cut the first
-//! stretch of a path only, by distance along the view axis.
+//! Rays of a perspective camera start on its lens. Rays of an orthographic camera start on the plane
+//! through the camera, and nothing behind that plane is seen. Clipping planes cut only the first stretch
+//! of a path, by distance along the view axis.
 
 use crate::math::warp;
 use crate::scene::{Camera, Pose, Projection};
@@ -51,9 +51,9 @@ pub struct CameraRay {
 }
 
 impl CameraRays {
-    /// The camera where its node stands. Its size does not matter, as glTF asks, and a mirrored node
-    /// mirrors no picture: the camera looks where the transform takes -Z, and the picture's top is
-    /// where it takes +Y, as far as that is at right angles to the view.
+    /// Places the camera at its node. The node's scale is ignored, as glTF asks, and a mirrored node does
+    /// not mirror the picture. The camera looks where the transform takes -Z. The top of the picture is
+    /// where it takes +Y, projected at right angles to the view.
     pub fn new(camera: &Camera, pose: &Pose, width: u32, height: u32) -> CameraRays {
         let world = pose.world(camera.node);
         let [right, up, back] = view_axes(world.matrix3.as_dmat3().to_cols_array_2d());
@@ -117,9 +117,9 @@ impl CameraRays {
     }
 }
 
-/// Right, up and back of a view, unit and at right angles, from where a transform takes the three
-/// axes. An axis that the transform collapses follows from the others, in double precision, so that
-/// a scale may be as small or large as a number can be.
+/// Right, up and back of a view, orthonormal, from the columns of a transform. An axis that the transform
+/// collapses to zero is derived from the others. Double precision allows for any scale that a 32-bit
+/// number can have.
 fn view_axes(columns: [[f64; 3]; 3]) -> [Vec3; 3] {
     let [x, y, z] = columns.map(|column| DVec3::from(column).normalize_or_zero());
     let back = z.try_normalize().or_else(|| x.cross(y).try_normalize());
@@ -203,7 +203,7 @@ mod tests {
                 assert_view(&rays);
             }
         }
-        // Of a transform that is flat, what remains decides: here the view is along the lost axis.
+        // If one axis is scaled to zero, it is derived from the other two, and the view is the same.
         for lost in 0..3 {
             let mut scale = DVec3::ONE;
             scale[lost] = 0.0;

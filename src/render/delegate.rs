@@ -35,13 +35,13 @@ pub struct RenderedFrame {
     pub stats: TraceStats,
 }
 
-/// How a frame goes on, for whoever watches.
+/// Receives the progress of a frame.
 pub trait Progress: Sync {
     /// Some of the frame's rows are done.
     fn rows_done(&self, rows: u64);
 }
 
-/// Nobody watches.
+/// Ignores progress.
 impl Progress for () {
     fn rows_done(&self, _: u64) {}
 }

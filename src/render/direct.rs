@@ -12,19 +12,19 @@ use glam::{Vec2, Vec3};
 pub struct Incoming {
     /// Unit, from the point.
     pub direction: Vec3,
-    /// Nits; lux of a facing surface if `pdf` is `None`.
+    /// Radiance in nits; if `pdf` is `None`, the irradiance of a facing surface in lux.
     pub radiance: Rgb,
     /// Density over solid angle, 1/sr; `None` for a direction or point that no ray can hit.
     pub pdf: Option<f32>,
-    /// Where it comes from; `None` from infinity.
+    /// The point of the light; `None` for an infinite light.
     pub from: Option<Anchor>,
-    /// Whether a reflected ray in its direction would find it, too.
+    /// Whether a reflected ray in this direction would hit the light, too.
     pub is_seen: bool,
 }
 
 impl Integrator<'_> {
-    /// Light from the lights picked for a vertex. The numbers are one for picking, two for points on
-    /// lights, and one that stands for the place.
+    /// What a vertex reflects of the lights that are picked for it. `u_pick` picks the lights, `u` samples
+    /// points on them, and `salt` is a hash of the pixel and the bounce.
     pub(super) fn direct(
         &self,
         vertex: &Vertex,
@@ -52,8 +52,8 @@ impl Integrator<'_> {
         sum
     }
 
-    /// What a vertex reflects of some light, if nothing is in its way, over the density of having
-    /// found it and weighed against finding it by reflection.
+    /// What a vertex reflects of some light if nothing blocks it, divided by the probability and pdf of
+    /// the light sample, and weighted against hitting the light by a reflected ray.
     fn reflected(&self, vertex: &Vertex, pick: &LightPick, incoming: &Incoming) -> Rgb {
         if !vertex.lets_through(incoming.direction) {
             return Rgb::ZERO;
@@ -73,8 +73,8 @@ impl Integrator<'_> {
         }
     }
 
-    /// Light from a point of a picked light towards a point; with a normal, of which light comes
-    /// from one side only (zero: from any).
+    /// Samples a picked light as seen from a point. Infinite lights are sampled on the side of the normal
+    /// only, or all around if it is zero.
     pub fn incoming(&self, light: Picked, point: Vec3, normal: Vec3, u: Vec2) -> Option<Incoming> {
         let emitter = match light {
             Picked::Emitter(emitter) => emitter,
@@ -104,8 +104,8 @@ impl Integrator<'_> {
         })
     }
 
-    /// The share of light that gets from where it comes from to a point: none if anything stands in
-    /// its way, and what fog lets through.
+    /// The share of the light that reaches a point: zero if anything blocks it, else the transmittance of
+    /// the fog.
     pub fn arriving(
         &self,
         at: &Anchor,
@@ -131,8 +131,8 @@ impl Integrator<'_> {
     }
 }
 
-/// Numbers of its own for each of several lights, turned by an amount that depends on the place and
-/// the light alone, so that the samples of a place stay stratified for each light.
+/// Random numbers for one of several lights: `u` shifted, modulo 1, by a hash of `salt` and the light.
+/// All samples with one salt are shifted alike, so they stay stratified for each light.
 pub(super) fn another(u: Vec2, salt: u32, light: Picked) -> Vec2 {
     let code = match light {
         Picked::Emitter(emitter) => emitter,

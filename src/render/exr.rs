@@ -1,10 +1,10 @@
 //! Render buffers as OpenEXR files.
 //!
-//! One part: beauty as the unnamed RGBA layer, then what is asked for of `Z`, `N.X/Y/Z`,
-//! `albedo.R/G/B`, `variance.R/G/B` and `sampleCount`, ZIP-compressed scan lines. Beauty is half or
-//! float, all else float. The same buffers give the same bytes: what the program has to say about
-//! a frame is one JSON text in the attribute [`METADATA`], because crate `exr` keeps custom
-//! attributes in a hash map and several would be written in a random order.
+//! A file has one part with ZIP-compressed scan lines: beauty as the unnamed RGBA layer, and those of
+//! `Z`, `N.X/Y/Z`, `albedo.R/G/B`, `variance.R/G/B` and `sampleCount` that are asked for. Beauty is half
+//! or float, everything else float. The same buffers give the same bytes. For that reason all metadata is
+//! one JSON text in the attribute [`METADATA`]: crate `exr` keeps custom attributes in a hash map and
+//! would write several in a random order.
 
 use super::buffers::{Pixel, RenderBuffers};
 use crate::store::{open_regular, write_atomically};
@@ -134,7 +134,7 @@ impl Channels<'_> {
     }
 }
 
-/// The same JSON with all beyond ASCII escaped: an EXR text has one byte a character.
+/// The same JSON with non-ASCII characters escaped: an EXR text has one byte per character.
 fn ascii(json: &str) -> String {
     let mut text = String::with_capacity(json.len());
     for character in json.chars() {

@@ -1,17 +1,17 @@
-//! Homogeneous fog, once scattered.
+//! Homogeneous fog with single scattering.
 //!
-//! Lights are picked for every stretch of a path as a whole (seed, "Extending to volume render"). For
-//! each light a point of the stretch is drawn by the angle under which the light sees it (Kulla and
-//! Fajardo 2012, "Importance Sampling Techniques for Path Tracing in Participating Media", section 4),
-//! which cancels the pole of `1/d^2`. It is drawn only where the light can shine: a narrow beam does so
-//! on a short part. From that point light is taken as from any other. An infinite light sees nothing
-//! under an angle; its points are drawn by what the fog lets through. Light that is scattered twice is
-//! left out.
+//! Lights are picked for each stretch of a path as a whole (seed, "Extending to volume render"). For each
+//! picked light one point of the stretch is sampled equi-angularly (Kulla and Fajardo 2012, "Importance
+//! Sampling Techniques for Path Tracing in Participating Media", section 4), which cancels the pole of
+//! `1/d^2`. Only the part of the stretch that the light can reach is sampled; for a narrow beam that part
+//! is short. At that point the light is sampled as at any other. The angle to an infinite light does not
+//! change along the stretch, so its points are sampled by transmittance. Multiple scattering is left out.
 //!
-//! Fog that has no box fills the one around everything in the scene, so that suns and domes reach it.
+//! Fog without a box fills the box around everything in the scene: suns and domes could not shine through
+//! endless fog.
 //!
-//! Places along a ray are in double precision, and a point is rounded once: a beam of a millimetre is
-//! found from kilometres away.
+//! Distances along a ray are in double precision, and a point is rounded to single precision only once.
+//! A beam a millimetre wide is therefore hit from kilometres away.
 
 use super::direct::another;
 use super::path::{Integrator, PathScratch};
@@ -26,9 +26,9 @@ use std::f32::consts::PI;
 /// Fog in one pose.
 #[derive(Clone, Debug)]
 pub struct Fog {
-    /// What a metre of it scatters, 1/m.
+    /// Scattering coefficient, 1/m.
     scattering: Rgb,
-    /// What it scatters and absorbs, 1/m.
+    /// Extinction coefficient, scattering plus absorption, 1/m.
     extinction: Rgb,
     anisotropy: f32,
     /// World space to the space of its box.
@@ -77,13 +77,13 @@ impl Fog {
         is_there.then_some(Fog { scattering, extinction, anisotropy, to_box, min, max })
     }
 
-    /// Where a ray is inside, between 0 and a length, metres.
+    /// The interval of a stretch that is inside the fog's box, metres from its start.
     fn inside(&self, stretch: &Stretch) -> Option<(f64, f64)> {
         let o = self.to_box.transform_point3(stretch.origin);
         let d = self.to_box.transform_vector3(stretch.direction);
         let (mut from, mut to) = (0.0, stretch.length);
         for axis in 0..3 {
-            // In the plane of a face both are infinite or not numbers: then the side decides.
+            // Parallel to a face both quotients are infinite or NaN; the origin alone decides.
             if d[axis] == 0.0 {
                 if o[axis] < self.min[axis] || o[axis] > self.max[axis] {
                     return None;
@@ -97,7 +97,7 @@ impl Fog {
         (from < to).then_some((from, to))
     }
 
-    /// The share of light that a stretch lets through.
+    /// The transmittance of a stretch of a ray.
     pub fn transmittance(&self, origin: Vec3, direction: Vec3, length: f32) -> Rgb {
         match self.inside(&stretch(origin, direction, length)) {
             Some((from, to)) => self.through(to - from),
@@ -109,12 +109,12 @@ impl Fog {
         (self.extinction.as_dvec3() * -metres).exp().as_vec3()
     }
 
-    /// Henyey and Greenstein's phase function, 1/sr, of light that comes from one direction and goes
-    /// on against the other; both are unit.
+    /// Henyey and Greenstein's phase function, 1/sr. Light arrives from `toward_light` and leaves along
+    /// `-ray`; both are unit.
     fn phase(&self, toward_light: Vec3, ray: Vec3) -> f32 {
         let g = self.anisotropy;
-        // 1 + g^2 - 2 g cos, by the chord between the directions: at the peak of a narrow lobe the
-        // sum itself is rounding.
+        // 1 + g^2 - 2 g cos, written with the chord between the directions: at the peak of a narrow
+        // lobe the plain sum would be nothing but rounding error.
         let peak = if g < 0.0 { toward_light + ray } else { toward_light - ray };
         let base = (1.0 - g.abs()).powi(2) + g.abs() * peak.length_squared();
         (1.0 - g.abs()) * (1.0 + g.abs()) / (4.0 * PI * base * base.sqrt())
@@ -126,23 +126,23 @@ fn stretch(origin: Vec3, direction: Vec3, length: f32) -> Stretch {
     Stretch { origin, direction, length: length.into() }
 }
 
-/// A place on a stretch.
+/// A sampled point of a stretch.
 struct Drawn {
-    /// Metres from its begin.
+    /// Metres from the start.
     t: f64,
     /// 1/m.
     pdf: f64,
 }
 
-/// A place by the angle under which a point sees it.
+/// Equi-angular sampling: a point of a stretch, uniform in the angle under which `seen_from` sees it.
 fn by_angle(stretch: &Stretch, seen_from: DVec3, u: f64) -> Option<Drawn> {
     let to_point = seen_from - stretch.origin;
     let nearest = to_point.dot(stretch.direction);
     let off = (to_point - nearest * stretch.direction).length();
-    // On the line itself every angle is the same: keep a little off it.
+    // On the line itself the angle does not change along it: keep a little off.
     let off = off.max(1e-5 * stretch.length).max(f64::MIN_POSITIVE);
-    // From there to the begin and to the end, along the line. Neither the angle between them nor the
-    // place is a difference of large numbers, which would be rounding from far away.
+    // Along the line from the nearest point to the start and to the end. Neither the angle between them
+    // nor `t` is a difference of large numbers, which from far away would be only rounding error.
     let (begin, end) = (-nearest, stretch.length - nearest);
     let angle = (stretch.length * off).atan2(off * off + begin * end);
     let (sin, cos) = (u * angle).sin_cos();
@@ -152,7 +152,7 @@ fn by_angle(stretch: &Stretch, seen_from: DVec3, u: f64) -> Option<Drawn> {
     (pdf.is_finite() && pdf > 0.0).then_some(Drawn { t, pdf })
 }
 
-/// A place by what the fog lets through.
+/// A point of a stretch with density proportional to transmittance.
 fn by_transmittance(length: f64, extinction: f64, u: f64) -> Drawn {
     let lost = -(-extinction * length).exp_m1();
     let t = (-(-u * lost).ln_1p() / extinction).min(length);
@@ -160,7 +160,7 @@ fn by_transmittance(length: f64, extinction: f64, u: f64) -> Drawn {
 }
 
 impl Integrator<'_> {
-    /// A place where an emitter may shine, by the angle under which it sees it.
+    /// Samples the part of a stretch that an emitter can illuminate, equi-angularly about its middle.
     fn by_angle_of(&self, emitter: u32, stretch: &Stretch, u: f64) -> Option<Drawn> {
         let Stretch { origin, direction, length } = *stretch;
         let (from, to) = self.emitters.lit_part(emitter, origin, direction, length)?;
@@ -169,7 +169,7 @@ impl Integrator<'_> {
         Some(Drawn { t: from + drawn.t, ..drawn })
     }
 
-    /// Light scattered once towards the begin of a stretch of a ray.
+    /// Light that the fog along a stretch of a ray scatters, once, towards the ray's origin.
     pub(super) fn scattered(
         &self,
         fog: &Fog,
@@ -210,7 +210,7 @@ impl Integrator<'_> {
     }
 }
 
-/// A box around all meshes, all lights that are somewhere, and the camera.
+/// The box around all meshes, all finite lights, and the camera.
 fn around_everything(scene: &Scene, pose: &Pose, camera: &Camera) -> (Vec3, Vec3) {
     let mut boxes = vec![None; scene.meshes.len()];
     let (mut min, mut max) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
@@ -277,7 +277,7 @@ mod tests {
             prop_assert!((f64::from(through) - expected).abs() < 1e-6 + 1e-15 * away / size);
         }
 
-        /// The density is that of the places, which are all of the stretch.
+        /// The pdf is that of the sampled points, and they cover the whole stretch.
         #[test]
         fn places_have_the_density_they_tell(
             length in -9.0..9.0, off in -9.0..9.0, along in -9.0..9.0, depth in -9.0..3.0,
@@ -300,7 +300,7 @@ mod tests {
                     prop_assert!((0.0..=length).contains(&here.t));
                 }
                 prop_assert!(draw(0.0).unwrap().t <= 1e-12 * length);
-                // Of what no light gets through, the far end is never met.
+                // In fog that no light gets through, the far end is never sampled.
                 prop_assert!(draw(1.0).unwrap().t >= (1.0 - 1e-9) * length || depth > 0.5);
             }
         }

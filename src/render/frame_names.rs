@@ -4,10 +4,10 @@ use super::frames::Frames;
 use std::path::{PathBuf, is_separator};
 use thiserror::Error;
 
-/// A pattern from which every frame gets its name. In the file's own name one run of `#` is the frame
-/// number, padded with zeros to the run's length; or `%d` or `%04d` is, as in C. `%%` is a percent sign
-/// there, and `%#` a number sign. The folders before it are taken as they are written. A number that is
-/// longer than its place is written in full.
+/// A pattern that gives every frame a name. In the file's own name one run of `#` stands for the frame
+/// number, padded with zeros to the run's length; alternatively `%d` or `%04d` does, as in C. There, `%%`
+/// is a percent sign and `%#` a number sign. Folder names are taken literally. A number longer than its
+/// place is written in full.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct FrameNames {
     pattern: String,
@@ -50,7 +50,7 @@ pub enum FrameNamesError {
 }
 
 impl FrameNames {
-    /// Understands a pattern.
+    /// Parses a pattern.
     pub fn new(pattern: &str) -> Result<FrameNames, FrameNamesError> {
         let (folder, file) = pattern.split_at(start_of_file(pattern));
         if matches!(file, "" | "." | "..") {
@@ -69,7 +69,7 @@ impl FrameNames {
                 rest = &rest[run..];
                 run
             } else if next != '%' || rest.starts_with("%%") || rest.starts_with("%#") {
-                // Of a pair the second is meant.
+                // `%%` and `%#` stand for their second character.
                 let skipped = if next == '%' { 1 } else { 0 };
                 let length = rest[skipped..].chars().next().map_or(0, char::len_utf8);
                 text.push_str(&rest[skipped..skipped + length]);

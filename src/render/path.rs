@@ -1,10 +1,10 @@
 //! The integrator: paths from the eye, with next-event estimation at every point.
 //!
-//! Light is found in two ways, by [picking](super::direct) lights and by reflecting a ray into one,
-//! which the power heuristic weighs against each other (Veach 1997, section 9.2.2). How often a light
-//! is expected to be picked is part of the density on both sides: when a ray hits an emitter, the
-//! tree is asked how often it would have been picked from the point before. Where there is
-//! [fog](super::fog), every stretch of a path also gathers what scatters along it.
+//! Light is found in two ways: by [picking](super::direct) lights, and by reflected rays that hit one. The
+//! power heuristic weighs the two against each other (Veach 1997, section 9.2.2). The expected number of
+//! picks of a light is part of the density on both sides: when a ray hits an emitter, the tree is asked
+//! how often it would have been picked from the point before. In [fog](super::fog), every stretch of a
+//! path also gathers the light scattered along it.
 
 use super::bsdf::Reflection;
 use super::camera::{CameraRay, CameraRays};
@@ -21,7 +21,7 @@ use crate::math::random::{Sampler, hash};
 use crate::scene::Visibility;
 use glam::{Vec2, Vec3};
 
-/// Bounces after which a path may be ended by chance.
+/// Bounces before Russian roulette may end a path.
 const SURE_BOUNCES: u32 = 3;
 
 /// One frame, ready to be traced.
@@ -78,7 +78,7 @@ impl TraceStats {
     }
 }
 
-/// The point a reflected ray came from, for the weight of what it hits.
+/// The point that a reflected ray left, for the weight of a light that it hits.
 struct Origin {
     wanted: Wanted,
     point: Vec3,
@@ -98,7 +98,7 @@ pub struct Vertex {
     pub receiver: Receiver,
 }
 
-/// What a thread needs while it traces, to be used again and again.
+/// A thread's buffers, reused from path to path.
 #[derive(Debug, Default)]
 pub struct PathScratch {
     pub(super) picks: PickScratch,
@@ -108,7 +108,8 @@ pub struct PathScratch {
 }
 
 impl Integrator<'_> {
-    /// Traces one path through a pixel. `seed` stands for the pixel in its frame.
+    /// Traces one path through a pixel. `seed` is a hash of the pixel and the frame, `index` the number of
+    /// the sample.
     pub fn trace(
         &self,
         x: u32,
@@ -195,7 +196,7 @@ impl Integrator<'_> {
         seen
     }
 
-    /// Which hits on cut-outs count, by chance.
+    /// Decides at random which hits on cut-outs count; the probability is the coverage.
     pub fn cutouts(&self, seed: u32) -> impl Fn(u32, u32, Vec2) -> bool + '_ {
         move |instance: u32, triangle: u32, barycentric: Vec2| {
             let bits = hash(barycentric.x.to_bits(), barycentric.y.to_bits());
@@ -204,8 +205,8 @@ impl Integrator<'_> {
         }
     }
 
-    /// A point that a path from the eye visits: its last but `bounces`, or as far as it gets. `None`
-    /// if it hits nothing that reflects.
+    /// The vertex that a path from the eye reaches after `bounces` bounces, or its last one if it ends
+    /// earlier. `None` if it hits nothing that reflects.
     pub fn probe(&self, x: u32, y: u32, seed: u32, bounces: u32) -> Option<Vertex> {
         let mut sampler = Sampler::new(seed, 0);
         let [px, py, lx, ly] = sampler.next_4d();
@@ -231,7 +232,7 @@ impl Integrator<'_> {
         last
     }
 
-    /// The point that a hit is; `None` on a sphere light, which reflects nothing.
+    /// The vertex at a hit; `None` on a sphere light, which reflects nothing.
     fn vertex(&self, hit: &Hit, wo: Vec3) -> Option<Vertex> {
         let HitSurface::Triangle { instance, triangle, barycentric } = hit.surface else {
             return None;
@@ -256,7 +257,7 @@ impl Integrator<'_> {
         self.fog.as_ref().map_or(Rgb::ONE, through)
     }
 
-    /// Light that a ray finds at a hit, weighed against having picked it.
+    /// Light emitted at a ray's hit, weighted against picking that light.
     fn emitted(
         &self,
         hit: &Hit,
@@ -293,7 +294,7 @@ impl Integrator<'_> {
             })
     }
 
-    /// Light from infinity along a ray, weighed likewise.
+    /// Light of the infinite lights along a ray, weighted likewise.
     fn emitted_at_infinity(
         &self,
         direction: Vec3,
@@ -335,16 +336,16 @@ impl Integrator<'_> {
 }
 
 impl Vertex {
-    /// What lights are wanted for here: how it reflects matters if that is more than a cosine. Given a
-    /// sampler, draws a direction that it reflects to.
+    /// What lights are picked for here. The BSDF is part of it only if it has a specular lobe. With a
+    /// sampler, a direction is sampled from the BSDF.
     pub fn wanted(&self, sampler: Option<&mut Sampler>) -> Wanted {
         let receiver = self.receiver;
         let is_glossy = |lobes: &Lobes| lobes.at_normal + lobes.toward_grazing > 0.0;
         let Some(lobes) = self.reflection.lobes().filter(is_glossy) else {
             return Wanted::At(receiver);
         };
-        // A direction of its own: that which the path goes on in may hit a light, and then its weight
-        // must not depend on it.
+        // Independent of the direction in which the path continues: that one may hit a light, whose
+        // weight must not depend on the direction.
         let drawn = sampler.and_then(|sampler| {
             let [lobe, u, v, _] = sampler.next_4d();
             self.reflection.sample(lobe, Vec2::new(u, v))
@@ -353,8 +354,8 @@ impl Vertex {
         Wanted::Glossy(Glossy { receiver, to_eye: self.wo, lobes, toward })
     }
 
-    /// Whether the surface itself, not only its shading normal, lets light pass between `wo` and a
-    /// direction without going through it.
+    /// Whether `wi` is on the same side as `wo` of the geometric surface, and not only of the shading
+    /// normal.
     pub fn lets_through(&self, wi: Vec3) -> bool {
         self.anchor.normal.dot(wi) * self.anchor.normal.dot(self.wo) > 0.0
     }

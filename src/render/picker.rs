@@ -1,8 +1,8 @@
-//! Which lights to sample for a viewer: the strategies, side by side.
+//! Which lights to sample for a viewer: all strategies behind one interface.
 //!
-//! All answer the same two questions, pick some and tell how often a given one is expected to be
-//! picked, so the integrator cannot tell them apart and a picture has the same mean under each.
-//! Forced lights are no part of the question: each is sampled always.
+//! Every strategy does two things: it picks lights, and it tells how often a given light is expected to
+//! be picked. So the integrator cannot tell strategies apart, and a picture has the same mean under each.
+//! Forced lights bypass the strategy: each is always sampled.
 
 use super::settings::{LightStrategy, RenderSettings};
 use crate::emitter::InfiniteLight;
@@ -20,7 +20,7 @@ pub struct LightPick {
     pub light: Picked,
     /// What its contribution is divided by; positive.
     pub probability: f64,
-    /// How often it is expected to be picked: what it is weighed with; positive.
+    /// Expected number of picks, which enters the power heuristic; positive.
     pub expected: f64,
 }
 
@@ -35,7 +35,7 @@ pub enum Wanted {
     Along(Segment, f32),
 }
 
-/// Room for picking, to be used again and again.
+/// Buffers for picking, to be reused.
 #[derive(Debug, Default)]
 pub struct PickScratch {
     beside: Vec<f64>,
@@ -118,7 +118,7 @@ impl<'a> LightPicker<'a> {
             || self.infinite.iter().any(|light| light.forced)
     }
 
-    /// Whether picking looks at what lights may send.
+    /// Whether picking is by the full importance, which depends on orientation and reflection.
     pub fn looks(&self) -> bool {
         matches!(self.strategy, LightStrategy::Tree | LightStrategy::Exhaustive)
     }
@@ -128,8 +128,8 @@ impl<'a> LightPicker<'a> {
         !self.splitting.is_off() && self.splitting.test == SplitTest::SolidAngle
     }
 
-    /// Calls `visit` with every light that is picked with a random number in `[0, 1)`. `salt` stands
-    /// for the place.
+    /// Picks lights with a random number in `[0, 1)` and calls `visit` with each. `salt` identifies the
+    /// point or stretch.
     pub fn pick(
         &self,
         wanted: &Wanted,
@@ -234,13 +234,13 @@ impl<'a> LightPicker<'a> {
         }
     }
 
-    /// How many lights there are to pick from without looking.
+    /// Number of lights that are not forced.
     pub fn count(&self) -> u32 {
         self.tree.unforced_count()
             + self.infinite.iter().filter(|light| !light.forced).count() as u32
     }
 
-    /// The lights to pick from, by number: emitters, then those at infinity.
+    /// An unforced light by number: emitters come first, then infinite lights.
     fn light(&self, at: u32) -> Picked {
         match at.checked_sub(self.tree.unforced_count()) {
             None => Picked::Emitter(at),
@@ -251,7 +251,7 @@ impl<'a> LightPicker<'a> {
         }
     }
 
-    /// The same for every viewer.
+    /// Picks with probabilities that are the same for every viewer.
     fn pick_blindly(&self, u: f64, mut visit: impl FnMut(LightPick)) {
         let Some(last) = self.count().checked_sub(1) else { return };
         let at = match self.running_power.last() {
@@ -265,7 +265,7 @@ impl<'a> LightPicker<'a> {
         }
     }
 
-    /// The probability of a light where all viewers are alike: by power or uniformly.
+    /// The probability of a light that is the same for every viewer: by power or uniform.
     pub fn blind_probability(&self, light: Picked) -> f64 {
         match self.running_power.is_empty() {
             true => 1.0 / f64::from(self.count()),

@@ -62,8 +62,8 @@ pub struct RenderSettings {
     pub max_lights: u32,
     /// What makes a cluster worth splitting.
     pub split_by: SplitBy,
-    /// Weigh picked lights and lights that reflected rays hit against each other. Without, lights
-    /// are found by picking alone.
+    /// Multiple importance sampling: picked lights are weighed against lights that reflected rays hit.
+    /// Without it, lights are found by picking alone.
     pub mis: bool,
 }
 

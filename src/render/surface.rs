@@ -1,14 +1,14 @@
 //! From a hit to a shading point: normals, textures, material.
 //!
 //! [`Surfaces`] answers for one frame. It evaluates a [`Material`] (factors times textures times
-//! vertex colour) and the mesh's attributes at a point of a triangle; it does not trace, and what a
-//! surface emits is not its affair but that of the light that the mesh is.
+//! vertex colour) and the mesh's attributes at a point of a triangle. It does not trace, and it does not
+//! evaluate emission.
 //!
-//! Sides. The geometric normal of a hit is the front's. Reflection is two-sided, so the shading frame
-//! is turned to the side that `wo` is on. A normal of the file that points against the winding is
-//! turned. Where the file has none, the triangle's own counts. A normal that a normal map or
-//! interpolation bends away from `wo` is bent back until `wo` is above its horizon, but no farther than
-//! the triangle itself stands: a flat surface is never bent, however grazing `wo` is.
+//! Sides. The geometric normal of a hit is the front's. Reflection is two-sided, so the shading frame is
+//! flipped to the side of `wo`. A normal of the file that points against the winding is flipped. If the
+//! file has no normals, the triangle's normal is used. A normal that a normal map or interpolation bends
+//! away from `wo` is bent back until `wo` is above its horizon. It is not bent past the cosine between
+//! `wo` and the triangle's normal: a flat surface is never bent, however grazing `wo` is.
 
 use super::bsdf::{Bsdf, SurfaceSample};
 use super::rays::Anchor;
@@ -64,9 +64,9 @@ impl<'a> Surfaces<'a> {
         Surfaces { scene, pose, plain: Material::default() }
     }
 
-    /// Which share of light a point of a cut-out stops, in `[0, 1]`: its opacity where it blends,
-    /// 0 or 1 where it masks, 1 where it is opaque. A ray counts a hit if this exceeds a random
-    /// number from `[0, 1)`.
+    /// The share of light that a point blocks, in `[0, 1]`: its opacity in a blended material, 0 or 1 in
+    /// a masked one, 1 in an opaque one. A ray counts a hit if this exceeds a random number from
+    /// `[0, 1)`.
     pub fn coverage(&self, instance: u32, triangle: u32, barycentric: Vec2) -> f32 {
         let (at, material) = self.locate(instance, triangle, barycentric);
         let opacity = || {
@@ -215,7 +215,7 @@ fn cofactor(m: DMat3) -> DMat3 {
     DMat3::from_cols(m.y_axis.cross(m.z_axis), m.z_axis.cross(m.x_axis), m.x_axis.cross(m.y_axis))
 }
 
-/// The unit normal, bent just so far that its cosine with `wo` is not below the least.
+/// The unit normal, bent towards `wo` just until their cosine is at least `least`.
 fn toward(normal: Vec3, wo: Vec3, least: f32) -> Vec3 {
     let cosine = normal.dot(wo);
     if cosine >= least {

@@ -1,17 +1,17 @@
 //! Files that are either whole or not there.
 //!
 //! An output is written to a temporary file in the folder where it belongs, flushed to the disk
-//! and renamed over its name. Whoever looks at the name sees the old file or the new one, never a
-//! part of one, even if the machine stops in between; a failed write leaves the old file alone
-//! and no temporary one behind.
+//! and renamed over its name. A reader sees the old file or the new one, never a part of one, even if
+//! the machine stops in between. A failed write leaves the old file as it was and removes the temporary
+//! one.
 //!
 //! Of two writers of one name the last to finish wins. A writer that is killed (`kill -9`, a machine that
 //! stops) cannot clean up: its temporary file, `.candelabra-*.part` in the output's folder, stays. Nothing
 //! reads it and no later writer takes its name. Such files may be removed once they are older than any
 //! job that runs.
 //!
-//! Work that ends in a file should not be found to be in vain when it is done: [`check_writable`] tells
-//! beforehand, as far as can be told.
+//! Long work should not fail only when its output is written: [`check_writable`] tests beforehand, as far
+//! as possible, whether that will succeed.
 
 use std::fs::{self, File};
 use std::io::{self, BufWriter, Write};
@@ -20,7 +20,7 @@ use tempfile::Builder;
 
 /// Writes a file through `write`, all or nothing. Parent folders are created.
 ///
-/// Errors name the path and, where the disk is full, the remedy; they keep the kind of what the system or
+/// Errors name the path and, if the disk is full, the remedy. Their kind is the one that the system or
 /// `write` reported.
 pub fn write_atomically(
     path: &Path,
@@ -38,9 +38,9 @@ pub fn write_atomically(
     })
 }
 
-/// Makes sure that a file can be written: that no folder or device has its name, and that its folder, or
-/// the nearest one above it that is there, takes a temporary file. Nothing is left behind. Errors name
-/// the path and the remedy.
+/// Checks that a file can be written: no folder or device has its name, and a temporary file can be
+/// created in its folder or, if that does not exist, in the nearest one above that does. Nothing is left
+/// behind. Errors name the path and the remedy.
 pub fn check_writable(path: &Path) -> io::Result<()> {
     check(path).map_err(|error| {
         let problem =

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 /// no node straddles two cache lines.
 pub const ALIGNMENT: usize = 64;
 
-/// Blocks zeroed by one task at least.
+/// The fewest blocks that one task zeroes.
 const TOGETHER: usize = 1 << 12;
 
 #[derive(Clone, Copy, Pod, Zeroable)]

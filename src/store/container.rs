@@ -13,7 +13,7 @@ pub const MAGIC: [u8; 8] = *b"\x89LTR\r\n\x1a\n";
 /// Readers refuse another major version and read every minor one.
 pub const VERSION: (u16, u16) = (1, 1);
 const BYTE_ORDER_MARK: u32 = 0x0102_0304;
-/// No file has more sections; a header that says so is not believed.
+/// The most sections that a file may have.
 const MOST_SECTIONS: u32 = 256;
 
 /// Four ASCII letters that name a section.
@@ -87,7 +87,8 @@ impl<'a> ContainerWriter<'a> {
         });
     }
 
-    /// Adds a section whose elements, zero at first, are written in place when the file is.
+    /// Adds a section whose elements are zero until `fill` writes them in place, in
+    /// [`finish`](Self::finish).
     pub fn section_with<T: Pod>(
         &mut self,
         id: SectionId,
@@ -285,7 +286,7 @@ impl<D: AsRef<[u8]>> Container<D> {
     }
 
     /// The elements of a range that [`find`](Container::find) gave; empty if the bytes are not
-    /// aligned for `T`, which neither a mapped file nor [`AlignedBytes`] is.
+    /// aligned for `T`. Those of a mapped file and of [`AlignedBytes`] always are.
     #[inline]
     pub fn view<T: Pod>(&self, range: &Range<usize>) -> &[T] {
         bytemuck::try_cast_slice(&self.data.as_ref()[range.clone()]).unwrap_or(&[])

@@ -1,7 +1,7 @@
 //! Regular files, and nothing that only looks like one.
 //!
-//! A pipe blocks who opens it, and a device such as `/dev/zero` never ends. Inputs are opened here, so that
-//! both are refused at once.
+//! Opening a pipe blocks, and a device such as `/dev/zero` never ends. Inputs are opened here, so that both
+//! are refused at once.
 
 use std::fs::{self, File};
 use std::io::{self, ErrorKind, Read};

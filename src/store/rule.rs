@@ -3,7 +3,7 @@
 use super::SectionId;
 use std::fmt;
 
-/// A rule of the format: what must be so. The [page](super) has it by the same number, in the same words.
+/// A rule of the format. The [page](super) states it under the same number, in the same words.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Rule {
     /// Whose rule it is: a section, or [`HEADER`](Rule::HEADER) or [`TABLE`](Rule::TABLE).
@@ -44,7 +44,7 @@ macro_rules! rules {
 }
 pub(crate) use rules;
 
-/// What of a part a rule is about.
+/// Where in its part a rule is broken.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Record {
     /// All of it.

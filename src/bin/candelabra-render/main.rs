@@ -40,7 +40,7 @@ fn main() -> ExitCode {
     }
 }
 
-/// Whether options that are right by themselves are not right together.
+/// Whether the options contradict each other although each is valid by itself.
 fn is_usage(error: &anyhow::Error) -> bool {
     error.is::<FrameNamesError>() || error.downcast_ref().is_some_and(ViewError::is_usage)
 }

@@ -30,8 +30,8 @@ impl Bar {
         self.0.set_message(format!("frame {frame}"));
     }
 
-    /// Prints a line above the bar, on standard output. That nobody reads on (`| head`) stops no
-    /// frame.
+    /// Prints a line above the bar, on standard output. A closed pipe (`| head`) does not stop the
+    /// render.
     pub fn line(&self, text: &str) {
         self.0.suspend(|| {
             let _ = writeln!(std::io::stdout(), "{}", Plain(text));

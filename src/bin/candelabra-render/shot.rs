@@ -76,7 +76,7 @@ pub fn render(arguments: &Arguments) -> Result<usize> {
     }
 }
 
-/// The emitters of a scene, with a bar where that lasts.
+/// The emitters of a scene, with a progress bar if that takes long.
 fn collect(scene: &Scene, tree: Option<&OpenedTree>) -> Emitters {
     let bar = TextureBar::new();
     pipeline::collect_emitters(scene, tree, &|done, all| bar.show(done, all))
@@ -145,8 +145,9 @@ const LEAST_TOLD_S: f64 = 0.1;
 const SOFTWARE: &str = concat!("candelabra-render ", env!("CARGO_PKG_VERSION"));
 
 impl Stamp {
-    /// Over everything that the pixels depend on. The tree is not named: a fresh one follows from
-    /// the scene and the algorithm, and its own fingerprint is of all frames that it was built for.
+    /// The fingerprint covers everything that the pixels depend on. The tree is not part of it: a fresh one
+    /// follows from the scene and the algorithm, and its own fingerprint covers all frames that it was
+    /// built for.
     fn new(
         content: &[[u8; 32]; 2],
         (camera, place): (&Camera, &[&Node]),

@@ -126,7 +126,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let (built, building) = timed(|| build(&survey, base, &mut out));
     let Built { bytes, is_partial } = built?;
     let (written, writing) = timed(|| {
-        // What is about to replace a good file must be one.
+        // Only a verified tree may replace the old file.
         let tree = LightTree::open(bytes).and_then(|tree| tree.verify().map(|()| tree));
         let tree = tree.with_context(|| format!("{}: not written", output.display()))?;
         let bytes = tree.into_bytes();
@@ -162,13 +162,13 @@ fn timed<T>(work: impl FnOnce() -> T) -> (T, Duration) {
     (done, started.elapsed())
 }
 
-/// The emitters of a scene, nothing of them taken from a file, with a bar where that lasts.
+/// The emitters of a scene, computed without a tree file, with a progress bar if that takes long.
 fn collect(scene: &Scene) -> Emitters {
     let bar = TextureBar::new();
     pipeline::collect_emitters(scene, None::<&OpenedTree>, &|done, all| bar.show(done, all))
 }
 
-/// What a process spends that renders with the file, between reading the scene and its first frame.
+/// The time that a process with the file spends on lights, between reading the scene and its first frame.
 fn with_file(arguments: &Arguments, scene: &Scene, output: &Path) -> Result<Duration, TreeError> {
     let (checked, with) = timed(|| {
         let tree = pipeline::open_tree(output, true)?;
@@ -179,7 +179,7 @@ fn with_file(arguments: &Arguments, scene: &Scene, output: &Path) -> Result<Dura
     Ok(with)
 }
 
-/// What a process spends on the tree of one frame.
+/// The time that a process without the file spends on the tree of one frame.
 fn without_file(scene: &Scene, emitters: &Emitters, frame: i32) -> Result<Duration> {
     let (survey, surveying) = timed(|| pipeline::survey(scene, emitters, &[frame]));
     let survey = survey?;
@@ -187,7 +187,8 @@ fn without_file(scene: &Scene, emitters: &Emitters, frame: i32) -> Result<Durati
     Ok(surveying + building)
 }
 
-/// When the file has paid for itself, by what this process has taken and what others will.
+/// Reports after how many processes the file has paid for itself. `made` is the time of this process,
+/// `without` and `with` are those of a render without and with the file.
 fn report(out: &mut impl Write, made: Duration, without: Duration, with: Duration) -> Result<()> {
     write!(
         out,

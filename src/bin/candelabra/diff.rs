@@ -46,7 +46,7 @@ pub struct Arguments {
 /// Lights that are listed, of each shot.
 const LISTED: usize = 20;
 const DIFFERENT: u8 = 1;
-/// What every failure of this command ends with, as those of `diff` do.
+/// The exit code of every failure of this command, as of Unix `diff`.
 pub const TROUBLE: u8 = 2;
 
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
@@ -105,7 +105,7 @@ fn print<T: Display>(
         true => json(&mut out),
         false => write!(out, "{}", text(if arguments.all { usize::MAX } else { LISTED })),
     };
-    // A reader that has seen enough (`| head`) does not make the versions the same.
+    // A closed pipe (`| head`) is no error: the exit code still tells whether the versions differ.
     match written.and_then(|()| out.flush()) {
         Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(()),
         written => written,

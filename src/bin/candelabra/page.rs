@@ -5,7 +5,7 @@ use candelabra::store::{check_writable, write_atomically};
 use std::io::Write;
 use std::path::Path;
 
-/// Makes sure, before there is a page, that it can be written and would not replace what it is about.
+/// Checks beforehand that a page can be written and does not overwrite one of its inputs.
 pub fn check(page: &Path, inputs: &[&Path]) -> Result<()> {
     let real = |path: &Path| path.canonicalize().ok();
     if inputs.iter().any(|input| real(page).is_some() && real(input) == real(page)) {

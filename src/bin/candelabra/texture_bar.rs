@@ -1,10 +1,10 @@
-//! A bar while emission textures are integrated, where that lasts.
+//! A progress bar for the integration of emission textures, shown only if that takes long.
 
 use indicatif::{ProgressBar, ProgressStyle};
 use std::sync::OnceLock;
 use std::time::{Duration, Instant};
 
-/// What takes less is not worth a bar.
+/// Time before the bar is shown.
 const PATIENCE: Duration = Duration::from_secs(1);
 
 /// Counts triangles. Draws nothing where there is no terminal.

@@ -54,7 +54,7 @@ impl Owner {
     }
 }
 
-/// Checks each file and says of each what it is, whatever the others are. The worst decides the code.
+/// Checks and reports on every file, even if others fail. The worst result decides the exit code.
 pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let mut out = Lines(std::io::stdout().lock());
     let owner = match &arguments.scene {

@@ -15,8 +15,8 @@ const MOST_ROWS: usize = 2_000;
 /// Changes of brightness are shown up to so many stops.
 const MOST_STOPS: f32 = 2.0;
 
-/// The page of a comparison. It shows the lights that did not change among those that did, and what
-/// the camera sees, if the comparison was asked for them.
+/// The page of a comparison. If the comparison was asked for them, it also shows the lights that did not
+/// change, and what the camera sees.
 pub fn html(diff: &Diff) -> String {
     let mut page = Page::new(&format!("{} → {}", diff.before.file, diff.after.file));
     summary(&mut page, diff);

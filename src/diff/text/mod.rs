@@ -107,7 +107,7 @@ impl fmt::Display for Text<'_, FolderDiff> {
     }
 }
 
-/// In two decimals; what is there is not called nothing.
+/// A share in per cent with two decimals. A positive share is never shown as 0.
 fn percent(share: f64) -> String {
     if share > 0.0 && share < 5e-5 { "<0.01".into() } else { format!("{:.2}", 100.0 * share) }
 }

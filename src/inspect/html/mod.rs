@@ -12,8 +12,8 @@ use plan::{light_boxes, plan};
 /// Lights in the table, at most.
 const MOST_ROWS: usize = 1_000;
 
-/// The page of a tree file; of the scene too, if that is what the tree was built from. The tree must
-/// have been verified.
+/// The page of a tree file. `scene` is given if the tree was built from that scene; then the page tells
+/// what the scene requires. The tree must have been verified.
 pub fn html<D: AsRef<[u8]>>(
     tree: &LightTree<D>,
     report: &TreeReport,
@@ -62,7 +62,7 @@ fn summary(page: &mut Page, report: &TreeReport) {
     ]);
 }
 
-/// The colour of a light's mark, by what it asks of a file.
+/// The colour of a light's mark: whether it is forced, changes or stands still.
 fn ink(light: &LightReport) -> Ink {
     match light {
         LightReport { forced: true, .. } => Ink::Red,

@@ -7,11 +7,11 @@ use crate::inspect::walk::{What, walk};
 use crate::light_tree::LightTree;
 use crate::page::{Count, Cuboid, Ink, Level, Mark, Plan, Short};
 
-/// Lights that are drawn one by one, at most; all are in the ground of density.
+/// Lights that are drawn one by one, at most. If not all are, a density below shows all emitters.
 const MOST_MARKS: usize = 10_000;
-/// Boxes of a level, at most: beyond, they hide each other.
+/// Boxes of a level, at most: more would hide each other.
 const MOST_BOXES: usize = 2_000;
-/// The level that is shown first has at most so many.
+/// Boxes of the level that is shown first, at most.
 const CLEAR_BOXES: usize = 100;
 
 /// The box of each light in the first frame, world space; empty if it is dark then.
@@ -92,7 +92,7 @@ fn caption(drawn: usize, lights: usize) -> String {
     }
 }
 
-/// The heaviest lights: all of those with the same energy, or none.
+/// The heaviest lights. Of lights with equal energy either all are drawn or none.
 fn marks<D: AsRef<[u8]>>(tree: &LightTree<D>, report: &TreeReport, boxes: &[Aabb]) -> Vec<Mark> {
     let rows = by_energy(tree);
     let energy = |row: usize| tree.lights()[row].energy;

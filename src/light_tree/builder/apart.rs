@@ -1,4 +1,4 @@
-//! Groups that tasks built apart, put together.
+//! Puts together the groups that tasks built separately.
 
 use super::Below;
 use super::reuse::Found;
@@ -9,7 +9,7 @@ use rayon::prelude::*;
 
 /// The groups of a part of a cluster.
 pub enum Apart<'a> {
-    /// None: the part is but one item.
+    /// No groups: the part is a single item.
     Leaf,
     Found(Found<'a>),
     Built {
@@ -36,7 +36,7 @@ impl Apart<'_> {
     }
 }
 
-/// Appends the groups of some parts, one after the other, and tells where each ended up.
+/// Appends the groups of some parts, one after the other, and returns where those of each begin.
 pub fn append(
     parts: &[Apart],
     link: &(impl Fn(usize) -> Link + Sync),

@@ -1,4 +1,4 @@
-//! Bins: what a slab of a cluster holds, summed so that the partition's cost comes cheap.
+//! Bins: what a slab of a cluster holds, summed so that the cost of a partition is cheap to compute.
 
 use super::item::Shape;
 use crate::bounds::{Aabb, Cone};
@@ -8,8 +8,8 @@ use std::f32::consts::{FRAC_PI_2, PI, TAU};
 /// Box, energy and spread of orientations of some items, for costs only.
 ///
 /// The cone here is not the bound that nodes get but an estimate from the mean direction (see
-/// [`Shape::directed`]). Sums need no trigonometry, and prefer none of the scene's axes, which unions
-/// of cones, taken one after the other, cannot promise.
+/// [`Shape::directed`]). Sums need no trigonometry and favour no axis of the scene. Successive unions of
+/// cones would depend on their order.
 #[derive(Clone, Copy)]
 pub struct Bin {
     /// Sum over the items of energy times mean direction, and of energy, in whole steps: exact.
@@ -49,7 +49,8 @@ impl Bin {
         self.min.x > self.max.x
     }
 
-    /// Chance that a point somewhere samples this cluster: energy times area times solid angle.
+    /// Energy times area times orientation measure: an estimate, up to a factor, of how likely a point
+    /// somewhere is to sample this cluster.
     pub fn cost(&self) -> f64 {
         if self.is_empty() {
             return 0.0;
@@ -70,7 +71,7 @@ impl Bin {
     }
 }
 
-/// [`Cone::measure`] for `theta_e = pi/2`, which is all but spots, without trigonometry:
+/// [`Cone::measure`] for `theta_e = pi/2`, which all lights but spots have, without trigonometry:
 /// `2 pi - pi c + pi^2/2 s` up to a right angle, `2 pi (1 - c) + pi (pi - theta_o) s` beyond.
 fn measure_of_faces(cos_o: f32, two_sided: bool) -> f32 {
     let sin_o = (1.0 - cos_o * cos_o).max(0.0).sqrt();

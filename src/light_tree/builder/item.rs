@@ -5,7 +5,7 @@ use glam::{Vec3, Vec4};
 use rayon::prelude::*;
 use std::f32::consts::PI;
 
-/// Some of the bounds, prepared for costs: what is read together stands together.
+/// Some of the bounds, prepared for computing costs. What is read together is stored together.
 pub struct Items {
     /// Their centres, and their energies.
     pub centers: Vec<Vec4>,
@@ -14,7 +14,7 @@ pub struct Items {
     pub inputs: Vec<u32>,
 }
 
-/// What bins sum, as vector instructions want it.
+/// What bins sum, laid out for vector instructions.
 #[derive(Clone, Copy)]
 pub struct Shape {
     /// Smallest corner, and -1 if it is two-sided: what bins keep the minimum of.
@@ -51,7 +51,7 @@ impl Items {
 impl Shape {
     fn new(bounds: &LightBounds) -> Shape {
         let LightBounds { aabb, cone, energy, .. } = *bounds;
-        // Faces and points are most of all, and need no cosine.
+        // Most items are faces and points, which need no cosine.
         let mean = match cone.theta_o {
             0.0 => 1.0,
             PI => 0.0,

@@ -4,10 +4,10 @@
 //! costliest part, and so on until there are eight, which become the lanes of its group. Bounds
 //! are then gathered bottom-up.
 //!
-//! What the bytes depend on is the *set* of bounds: sums are exact in any order
-//! ([`outline::Steps`]), cuts go where items differ, and where they do not, [`order`] decides. Neither
-//! the number of threads nor the order of the input shows. The same holds of every cluster: its groups
-//! follow from its own items, wherever it stands in the tree.
+//! The bytes depend on the *set* of bounds, not on the number of threads or the order of the input:
+//! sums are exact in any order ([`outline::Steps`]), cuts go between items that differ, and [`order`]
+//! decides between items that do not. The same holds for every cluster: its groups depend on its own
+//! items, not on where it stands in the tree.
 
 mod apart;
 mod bins;
@@ -35,20 +35,20 @@ pub const ALGORITHM_VERSION: u32 = 4;
 
 /// Below this depth clusters are cut by count: no input makes the recursion much deeper.
 const DEEPEST_BY_COST: usize = 100;
-/// The children of larger clusters are built side by side.
+/// The children of clusters with more items are built in parallel.
 const PARALLEL_ABOVE: usize = 4096;
 /// Items summed or moved by one task.
 const CHUNK: usize = 4096;
-/// A cluster that is sparser among the items than one in so many gets a copy of its own, where its
-/// items are neighbours in memory.
+/// A cluster that has less than one in this many of the items gets its own copy of them, in which they
+/// are neighbours in memory.
 const SPARSE: usize = 4;
-/// So many items are near enough to each other: they fit a core's own cache.
+/// Up to this many items need no such copy: they fit a core's own cache.
 const NEAR: usize = 4096;
 
 /// Builds a tree over some bounds, all of them [sound](LightBounds::is_sound), and appends its
 /// groups to `out` in preorder, a group before those of its children; `link` tells what each of the
 /// bounds is. Returns the bounds of everything and how many leaves were copied from the `earlier`
-/// tree, which changes nothing but the time it takes; `None` if there are no bounds.
+/// tree; `None` if there are no bounds. Copying changes only the time that the build takes.
 ///
 /// # Panics
 /// If there are 2^30 bounds or more.
@@ -87,7 +87,7 @@ struct Cluster<'a> {
 }
 
 impl Cluster<'_> {
-    /// Leaves an empty one in its place.
+    /// Takes it and leaves an empty one in its place.
     fn take(&mut self) -> Self {
         let empty = Cluster { places: &mut [], ..*self };
         std::mem::replace(self, empty)
@@ -112,8 +112,8 @@ struct Builder<'a, L> {
 }
 
 impl<L: Fn(usize) -> Link + Sync> Builder<'_, L> {
-    /// The groups of a cluster, copied or built. Returns its bounds as its nodes have them: rounded
-    /// outwards already, so that what a node says of itself contains what its children say.
+    /// Appends the groups of a cluster, copied or built. Returns its bounds as its nodes store them,
+    /// rounded outwards, so that a parent contains its children as they are stored.
     fn build_cluster(&self, cluster: Cluster, depth: usize, out: &mut Vec<Group>) -> LightBounds {
         let Some(found) = self.find(&cluster, depth) else {
             return self.build_anew(cluster, depth, out);
@@ -143,7 +143,7 @@ impl<L: Fn(usize) -> Link + Sync> Builder<'_, L> {
         Builder { items, ..*self }.build_group(cluster, depth, out)
     }
 
-    /// The group of a cluster, and those below it.
+    /// Appends the group of a cluster, and those below it.
     fn build_group(&self, cluster: Cluster, depth: usize, out: &mut Vec<Group>) -> LightBounds {
         let own = out.len();
         out.push(Group::zeroed());
@@ -169,7 +169,7 @@ impl<L: Fn(usize) -> Link + Sync> Builder<'_, L> {
         out[own].bounds()
     }
 
-    /// The groups of a part of a cluster; `None` if it is but one item.
+    /// Appends the groups of a part of a cluster; `None` if it is a single item.
     fn build_below(&self, part: &mut Cluster, depth: usize, out: &mut Vec<Group>) -> Option<Below> {
         (part.places.len() > 1).then(|| {
             let first = out.len();
@@ -177,7 +177,7 @@ impl<L: Fn(usize) -> Link + Sync> Builder<'_, L> {
         })
     }
 
-    /// The same of all parts, each by a task.
+    /// The same for all parts, each in a task of its own.
     fn build_side_by_side(
         &self,
         parts: &mut [Cluster],
@@ -199,9 +199,9 @@ impl<L: Fn(usize) -> Link + Sync> Builder<'_, L> {
         apart::append(&parts, self.link, out)
     }
 
-    /// Cuts a cluster into up to eight parts: the costliest first of those that fill a group of their
-    /// own. Lanes that are left then take the leaves of the smallest parts, whose groups would be
-    /// nearly empty.
+    /// Cuts a cluster into up to eight parts. Of the parts with more items than a group has lanes, the
+    /// costliest is cut first. Once there is none, the lanes that are left take the items of the smallest
+    /// parts, whose own groups would be nearly empty.
     fn divide<'c>(&self, cluster: Cluster<'c>, depth: usize) -> Vec<Cluster<'c>> {
         let mut parts = Vec::with_capacity(WIDTH);
         parts.push(cluster);
@@ -228,7 +228,7 @@ impl<L: Fn(usize) -> Link + Sync> Builder<'_, L> {
         parts
     }
 
-    /// Brings items that no cut tells apart into their [order].
+    /// Sorts items by their [order], where no cut does.
     fn sort(&self, places: &mut [u32]) {
         let compare = order::of(self.bounds);
         places.sort_unstable_by(|&a, &b| compare(self.input(a), self.input(b)));
@@ -242,7 +242,7 @@ fn next_to_cut(parts: &[Cluster]) -> Option<usize> {
     }
     let size = |at: usize| parts[at].places.len();
     let cost = |a: usize, b: usize| parts[a].cost.total_cmp(&parts[b].cost);
-    // Coincident lights cost nothing: then the largest.
+    // Coincident lights cost nothing: of those, the largest part.
     let by_cost = |&a: &usize, &b: &usize| cost(a, b).then(size(a).cmp(&size(b)));
     let by_size = |&a: &usize, &b: &usize| size(a).cmp(&size(b)).then(cost(a, b));
     let all = 0..parts.len();

@@ -1,7 +1,7 @@
 //! The order of bounds where no cut tells them apart.
 //!
-//! Whether one comes before another depends on these two alone. Where they stand in the input decides
-//! only between equals, and there nobody can tell.
+//! Which of two bounds comes first depends on their numbers alone. Their places in the input decide only
+//! between equal bounds, which are interchangeable.
 
 use crate::bounds::LightBounds;
 use std::cmp::Ordering;

@@ -48,17 +48,17 @@ impl Outline {
         (self.max - self.min).truncate()
     }
 
-    /// In which steps energies are summed.
+    /// The steps in which energies are summed.
     pub fn steps(&self) -> Steps {
         Steps::for_peak(self.max.w)
     }
 }
 
-/// Steps of energy, so coarse that sums of up to 2^30 items are exact: then no order shows in them, and
-/// there need be none. A step is 2^-22 of the largest energy at most, far below what costs can tell.
+/// Steps of energy, so coarse that sums over up to 2^30 items are exact and so the same in any order. A
+/// step is at most 2^-22 of the largest energy, far below what matters to costs.
 #[derive(Clone, Copy)]
 pub struct Steps {
-    /// Where the neighbours of a number in double precision are one step away.
+    /// A number so large that its neighbours in double precision are one step away.
     far: DVec4,
 }
 
@@ -67,11 +67,11 @@ impl Steps {
         /// All but the exponent is dropped.
         const EXPONENT: u64 = 0x7ff << 52;
         let power_of_two = f64::from_bits(f64::from(peak).to_bits() & EXPONENT);
-        // The half keeps negative numbers where the neighbours are as far.
+        // The half on top keeps the sum with a negative number where the neighbours are as far apart.
         Steps { far: DVec4::splat(1.5 * f64::from(1u32 << 30) * power_of_two) }
     }
 
-    /// What of an item is summed, in whole steps.
+    /// Rounds what is summed of an item to whole steps.
     #[inline]
     pub fn round(&self, directed: Vec4) -> DVec4 {
         (directed.as_dvec4() + self.far) - self.far

@@ -1,8 +1,8 @@
 //! What a build takes over from an earlier tree.
 //!
-//! The groups of a cluster follow from its items alone. So where all items of a cluster are the
-//! leaves of one subtree of the earlier tree, unchanged, and there are no others, that subtree is
-//! what a build would give: it is copied, and its leaves are told their new numbers.
+//! The groups of a cluster depend on its items alone. If the items are exactly the leaves of one subtree
+//! of the earlier tree, all unchanged, then a build would give that subtree again. So the subtree is
+//! copied, and its leaves get their new numbers.
 
 use super::DEEPEST_BY_COST;
 use super::order;
@@ -13,18 +13,18 @@ use rayon::prelude::*;
 use std::ops::Range;
 use std::sync::atomic::{AtomicU32, Ordering};
 
-/// An earlier tree, and where in it the bounds of a new one are that have not changed.
+/// An earlier tree, and where in it the unchanged bounds of a new tree are.
 pub struct Earlier<'a> {
     /// Its groups.
     pub groups: &'a [Group],
     /// For each of the new bounds its leaf: the number of the group in the tree times [`WIDTH`] plus
     /// the lane; [`CHANGED`] if there is none.
     pub slots: Vec<u32>,
-    /// Whether those that have one followed each other as they do now.
+    /// Whether the unchanged bounds are in the same order as they were.
     pub in_order: bool,
 }
 
-/// The slot of what is not in the earlier tree.
+/// The slot of bounds that are not in the earlier tree.
 pub const CHANGED: u32 = u32::MAX;
 
 /// An earlier tree, made ready to be searched for clusters.
@@ -43,7 +43,7 @@ pub struct Reuse<'a> {
 #[derive(Clone, Copy, Default)]
 struct Subtree {
     parent: u32,
-    /// Behind its last group.
+    /// One past its last group.
     end: u32,
     leaves: u32,
 }
@@ -70,14 +70,14 @@ impl<'a> Reuse<'a> {
         self.groups.len()
     }
 
-    /// The groups that a build of a cluster would give, if the earlier tree has them; the cluster by the
+    /// The groups that a build of a cluster would give, if the earlier tree has them. `cluster` are the
     /// places of its bounds.
     pub fn find(
         &self,
         cluster: impl ExactSizeIterator<Item = u32>,
         depth: usize,
     ) -> Option<Found<'_>> {
-        // Deeper down, clusters are cut otherwise.
+        // Deeper down, clusters are cut by count: there the groups depend on the depth, too.
         if depth + self.height > DEEPEST_BY_COST {
             return None;
         }
@@ -94,7 +94,7 @@ impl<'a> Reuse<'a> {
             root = self.subtrees[root].parent as usize;
         }
         let Subtree { end, leaves, .. } = self.subtrees[root];
-        // As many leaves, all of them inside: then they are the same.
+        // The subtree contains all items and has no more leaves than these: they are the same.
         let is_same = leaves == count && last as usize / WIDTH < end as usize;
         is_same.then(|| {
             self.reused.fetch_add(leaves, Ordering::Relaxed);
@@ -138,7 +138,7 @@ fn is_leaf(link: Link) -> bool {
     matches!(link, Link::Emitter(_) | Link::Instance(_))
 }
 
-/// The subtrees of all groups of a tree, and on how many levels the groups stand.
+/// The subtrees of all groups of a tree, and how many levels of groups the tree has.
 fn measure(groups: &[Group]) -> (Vec<Subtree>, usize) {
     let mut subtrees = vec![Subtree::default(); groups.len()];
     let mut heights = vec![1; groups.len()];
@@ -159,8 +159,8 @@ fn measure(groups: &[Group]) -> (Vec<Subtree>, usize) {
     (subtrees, heights.first().copied().unwrap_or(0))
 }
 
-/// Equal bounds follow each other by their numbers. Where they followed each other otherwise in the
-/// earlier tree, a build would swap them: then none of them counts as unchanged.
+/// Equal bounds are ordered by their places in the input. If the earlier tree has them in another order,
+/// a build would swap them, so none of them counts as unchanged.
 fn forget_swapped(slots: &mut [u32], groups: &[Group], bounds: &[LightBounds]) {
     let old = |slot: u32| groups[slot as usize / WIDTH].link(slot as usize % WIDTH);
     let compare = order::of(bounds);

@@ -6,7 +6,7 @@
 //! large ones between [bins](super::bins).
 //!
 //! A cut goes between centres that differ along its axis, and all sums are exact. So the halves, as
-//! sets, follow from the set that is cut: in which order its items are listed does not show.
+//! sets, depend only on the set that is cut, not on the order in which its items are listed.
 
 use super::CHUNK;
 use super::bins::Bin;
@@ -31,7 +31,7 @@ pub struct Halves {
 
 /// The cheapest cut found: after bin (or item) `after` along `axis`.
 struct Cut {
-    /// With `Kr`.
+    /// The cost of both halves times `Kr`.
     total: f64,
     cost: [f64; 2],
     axis: usize,
@@ -48,7 +48,7 @@ pub fn partition(items: &Items, cluster: &mut [u32], outline: &Outline) -> Optio
     }
 }
 
-/// `Kr` for each axis; no cut along an axis without extent, or with more than there are numbers for.
+/// `Kr` for each axis; `None`, for no cut, where the extent along the axis is zero or overflows.
 fn regularisation(outline: &Outline) -> [Option<f64>; 3] {
     let extent = outline.extent().as_dvec3().to_array();
     let can_be_cut = |along: &f64| *along > 0.0 && along.is_finite();
@@ -65,7 +65,7 @@ fn partition_exactly(items: &Items, cluster: &mut [u32], outline: &Outline) -> O
         *entry = (items.centers[place as usize], Bin::of(shape, steps.round(shape.directed)));
     }
     let along = |i: u8, axis: usize| entries[usize::from(i)].0[axis];
-    // Which of the entries are how far along an axis.
+    // The entries in their order along an axis.
     let sorted = |axis: usize| {
         let mut order: [u8; EXACT_UP_TO] = std::array::from_fn(|i| i as u8);
         order[..count].sort_by(|&a, &b| along(a, axis).total_cmp(&along(b, axis)));
@@ -131,7 +131,7 @@ fn partition_binned(items: &Items, cluster: &mut [u32], outline: &Outline) -> Op
     Some(Halves { left_count, cost, outlines })
 }
 
-/// Tries the cuts between bins that divide; keeps the first of equals.
+/// Tries the cuts after all bins for which `divides` holds. Of equally cheap cuts it keeps the first.
 fn cheapest_cut(
     bins: &[Bin],
     divides: impl Fn(usize) -> bool,
@@ -166,17 +166,17 @@ struct Slabs {
 }
 
 impl Slabs {
-    /// From here on single precision tells whole numbers and nothing else.
+    /// 2^23: from here on single precision has whole numbers only.
     const WHOLE: f32 = 8_388_608.0;
 
     fn new(outline: &Outline) -> Slabs {
-        // No more than can be multiplied by nothing.
+        // Finite, so that it can be multiplied by zero.
         let per_metre = |extent: f32| (BINS as f32 / extent).min(f32::MAX);
         let per_metre = Vec3::from_array(outline.extent().to_array().map(per_metre));
         Slabs { min: outline.min().extend(0.0), per_metre: per_metre.extend(0.0) }
     }
 
-    /// In which slab of each axis a centre is, plus [`WHOLE`](Slabs::WHOLE).
+    /// The slab of each axis that a centre is in, plus [`WHOLE`](Slabs::WHOLE).
     #[inline]
     fn rounded(&self, center: Vec4) -> Vec4 {
         let middle = (center - self.min) * self.per_metre - 0.5;
@@ -197,8 +197,8 @@ impl Slabs {
     }
 }
 
-/// Brings the items of the left half to the front and counts them; both halves keep their order, in
-/// which memory is read. Returns the outlines of both, too.
+/// Moves the items of the left half to the front. Both halves keep their order, so that memory is read
+/// in order. Returns the number of items on the left and the outlines of both halves.
 fn move_to_front(
     items: &Items,
     cluster: &mut [u32],
@@ -229,7 +229,7 @@ fn move_part_to_front(
 ) -> (usize, [Outline; 2]) {
     let mut outlines = [Outline::NONE; 2];
     let (mut front, mut behind, mut others) = (0, 0, vec![0; part.len()]);
-    // Without branches, which nothing could foretell.
+    // Without branches, which the processor could not predict.
     for at in 0..part.len() {
         let place = part[at];
         let center = items.centers[place as usize];

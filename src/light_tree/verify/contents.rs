@@ -1,4 +1,5 @@
-//! Whether a tree holds just the lights that it should, and its leaves hold the trees they stand for.
+//! Whether a tree holds exactly the lights that it should, and its leaves contain the trees that they
+//! stand for.
 
 use super::{Checked, check, rules};
 use crate::bounds::Aabb;
@@ -9,13 +10,13 @@ use crate::light_tree::tree::LightTree;
 use crate::store::{Record, Rule, Violation};
 use std::ops::Range;
 
-/// What transforming a box may add, relative to its size and place.
+/// Rounding error of transforming a box, relative to its size and its distance from the origin.
 const PLACING_TOLERANCE: f32 = 2e-5;
 
 impl<D: AsRef<[u8]> + Sync> LightTree<D> {
-    /// A tree holds just the lights that it should: each emitter once, and only trees that come earlier.
-    /// `seen` is room for the tree in whose row each emitter was last seen, plus one, by its place in
-    /// the tree.
+    /// Checks that a tree holds exactly the lights that it should: each emitter once, and only trees that
+    /// come earlier. `seen` is scratch space. For each emitter, by its place in the tree, it has the row
+    /// of the tree in which such an emitter was last seen, plus one.
     pub(super) fn verify_contents(
         &self,
         row: usize,
@@ -24,7 +25,7 @@ impl<D: AsRef<[u8]> + Sync> LightTree<D> {
     ) -> Checked {
         let kind = TreeKind::of(tree);
         let own = self.own_emitters(tree);
-        // No more than there are lanes to lead to them.
+        // No more emitters can have leaves than there are lanes.
         let most = own.len().min(self.groups_of(tree).len() * WIDTH);
         seen.resize(most.max(seen.len()), 0);
         let mark = row as u32 + 1;
@@ -97,8 +98,8 @@ impl<D: AsRef<[u8]> + Sync> LightTree<D> {
     }
 }
 
-/// The rule that is broken where something of a placed tree sticks out of the leaf that stands for it.
-/// Its energy is the leaf's own affair: a light may get brighter.
+/// The rule that is broken if a leaf does not contain the placed tree that it stands for. Energies are
+/// not compared, because a light may get brighter.
 fn sticks_out(leaf: &Node, instance: &InstanceRow, tree: &TreeRow) -> Option<Rule> {
     let to_local = instance.to_local.transform();
     let (root, outer) = (tree.root.bounds(), leaf.bounds());

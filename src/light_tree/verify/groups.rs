@@ -1,4 +1,4 @@
-//! Whether the groups of a tree form one: all are reached, once, and each lies inside its parent.
+//! Whether the groups of a tree form one: each is reached exactly once and lies inside its parent.
 
 use super::{Checked, first_violation, rules};
 use crate::light_tree::group::{Group, WIDTH};
@@ -6,14 +6,15 @@ use crate::light_tree::node::{Link, Node};
 use crate::light_tree::records::TreeRow;
 use crate::store::{Record, Rule, Violation};
 
-/// Energies are sums of a few `f32`.
+/// Relative rounding error of an energy that is the sum of a few `f32`.
 const ENERGY_TOLERANCE: f64 = 1e-6;
 
-/// What a check of one group says: the rule that is broken, and the lane, or all of them.
+/// The result of checking one group. An error is the rule that is broken and the lane that breaks it,
+/// `None` for the group as a whole.
 type InGroup = Result<(), (Rule, Option<usize>)>;
 
-/// All groups of a tree stand in preorder, each reached by one lane of an earlier one, and are contained
-/// in it. Then the walk down reaches every group, once, and ends.
+/// Checks that the groups of a tree stand in preorder, that one lane of an earlier group leads to each,
+/// and that this lane's node contains it. Then a walk down reaches every group once, and ends.
 pub(super) fn verify_groups(tree: &TreeRow, groups: &[Group]) -> Checked {
     let name = |own: usize, (rule, lane): (Rule, Option<usize>)| {
         let group = tree.first_group + own as u32;
@@ -33,11 +34,11 @@ pub(super) fn verify_groups(tree: &TreeRow, groups: &[Group]) -> Checked {
     first_violation(groups.len(), check)
 }
 
-/// For each group the slot of the lane that leads to it; or the group that is out of order, and the lane
-/// of it that leads astray.
+/// For each group the slot of the lane that leads to it. An error is the group that is out of order, and
+/// its lane that leads to a wrong group, if there is one.
 pub(super) fn parents_of(groups: &[Group]) -> Result<Vec<u32>, (usize, Option<usize>)> {
     let mut parents = vec![0; groups.len()];
-    // Behind the last group of each group's subtree.
+    // For each group, one past the last group of its subtree.
     let mut ends = vec![0; groups.len()];
     for own in (0..groups.len()).rev() {
         let mut end = own + 1;
@@ -58,7 +59,7 @@ pub(super) fn parents_of(groups: &[Group]) -> Result<Vec<u32>, (usize, Option<us
     }
 }
 
-/// Soundness, containment and energy of a group's nodes.
+/// Checks soundness, containment and energy of a group's nodes.
 fn check_group(group: &Group, parent: &Node) -> InGroup {
     if group.has_dirty_lane() {
         return Err((rules::UNUSED_LANE_IS_ZERO, None));

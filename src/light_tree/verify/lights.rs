@@ -7,24 +7,24 @@ use crate::light_tree::records::{FrameRow, LightRow, NO_TREE, TreeKind};
 use crate::light_tree::tree::LightTree;
 use std::ops::Range;
 
-/// The number of the emitter behind a light's.
+/// The number after that of a light's last emitter.
 fn next_emitter(light: &LightRow) -> u64 {
     u64::from(light.first_emitter) + u64::from(light.emitter_count)
 }
 
 impl<D: AsRef<[u8]> + Sync> LightTree<D> {
-    /// The lights' rows.
+    /// Checks the rows of the lights.
     pub(super) fn verify_lights(&self) -> Checked {
         let lights = self.lights();
         first_violation(lights.len(), |row| self.verify_light(row))?;
-        // More leaves than lanes are not to be looked for.
+        // Each emitter of class 0 has a leaf of its own, so a lane.
         let own = u64::from(self.first_of_class(LightRow::PLACED));
         let lanes = (self.groups().len() * WIDTH) as u64;
         let is_numbered = lights.last().map_or(0, next_emitter) < MOST as u64 && own <= lanes;
         check_all(is_numbered, rules::EMITTERS_ARE_NUMBERED)
     }
 
-    /// One of them, and that it comes after the one before it.
+    /// Checks one of them, and that it follows the one before it.
     fn verify_light(&self, row: usize) -> Checked {
         let light = &self.lights()[row];
         let before = row.checked_sub(1).map(|before| &self.lights()[before]);
@@ -49,7 +49,8 @@ impl<D: AsRef<[u8]> + Sync> LightTree<D> {
         &lights[from..to]
     }
 
-    /// The frames' rows, and the entries of forced lights that they, or the file, have.
+    /// Checks the rows of the frames and their entries of forced lights; those of the file if there are
+    /// no frames.
     pub(super) fn verify_frames(&self) -> Checked {
         let kind_of = |row: u32| self.trees().get(row as usize).and_then(TreeKind::of);
         let has_still = self.still_tree().is_some();
@@ -80,7 +81,7 @@ impl<D: AsRef<[u8]> + Sync> LightTree<D> {
         check_all(next_forced == self.forced().len() as u64, rules::FRAMES_USE_FORCED)
     }
 
-    /// A run of forced lights: all there are, in order.
+    /// Checks that a run of entries holds all forced lights, in order.
     fn verify_forced(&self, run: Range<usize>) -> Checked {
         let mut lights = self.lights_of(LightRow::FORCED..2 * LightRow::FORCED).iter();
         for entry in run.clone() {

@@ -1,5 +1,5 @@
-//! Proof that a file is what the format says: that traversal ends, stays inside, and never calls
-//! a lit point dark. Each check is one of the format's [rules].
+//! Proves that a file keeps the format: traversal ends, stays inside the file, and never calls a lit
+//! point dark. Each check is one of the format's [rules].
 
 mod contents;
 mod groups;
@@ -19,19 +19,19 @@ use rayon::prelude::*;
 
 type Checked<T = ()> = Result<T, Violation>;
 
-/// A rule that holds for a row, or does not.
+/// A violation of a rule by a row, unless the rule holds.
 fn check(holds: bool, rule: Rule, row: usize) -> Checked {
     if holds { Ok(()) } else { Err(Violation { rule, record: Record::Row(row as u32) }) }
 }
 
-/// A rule that holds for a section as a whole, or does not.
+/// A violation of a rule by a section as a whole, unless the rule holds.
 fn check_all(holds: bool, rule: Rule) -> Checked {
     if holds { Ok(()) } else { Err(Violation { rule, record: Record::All }) }
 }
 
-/// Checks rows side by side. The first violation in the file is told, however many threads look.
+/// Checks rows in parallel. Returns the first violation in the file, whatever the number of threads.
 fn first_violation(count: usize, check: impl Fn(usize) -> Checked + Sync) -> Checked {
-    /// Rows checked by one task: to look for the first costs more than to check a row.
+    /// Rows checked by one task: finding the first among tasks costs more than checking a row.
     const CHUNK: usize = 1 << 10;
     let in_chunk = |chunk: usize| {
         let start = chunk * CHUNK;
@@ -47,7 +47,7 @@ impl<D: AsRef<[u8]> + Sync> LightTree<D> {
     /// # Errors
     /// The first rule that is broken, with its section and record.
     pub fn verify(&self) -> Result<(), StoreError> {
-        // Side by side; the first violation is told, whatever is found first.
+        // In parallel. A wrong checksum is returned rather than a broken rule, whichever is found first.
         let (sums, rules) = rayon::join(|| self.verify_checksums(), || self.verify_rules());
         sums?;
         rules.map_err(StoreError::Broken)?;
@@ -72,7 +72,7 @@ impl<D: AsRef<[u8]> + Sync> LightTree<D> {
         self.verify_frames()
     }
 
-    /// The trees' rows: in range, and each following the tree before it.
+    /// Checks the rows of the trees: each is in range and follows the tree before it.
     fn verify_trees(&self) -> Checked {
         let all = self.groups().len() as u64;
         check_all(self.groups().len() < MOST / WIDTH, rules::GROUPS_ARE_NUMBERED)?;
@@ -95,7 +95,7 @@ impl<D: AsRef<[u8]> + Sync> LightTree<D> {
         check_all(groups == all, rules::TREES_USE_THE_GROUPS)
     }
 
-    /// Trees put somewhere.
+    /// Checks the rows of the instances.
     fn verify_instances(&self) -> Checked {
         for (row, instance) in self.instances().iter().enumerate() {
             let kind = self.trees().get(instance.tree as usize).and_then(TreeKind::of);

@@ -5,7 +5,7 @@ use crate::light_tree::records::TextureRow;
 use crate::light_tree::tree::LightTree;
 
 impl<D: AsRef<[u8]> + Sync> LightTree<D> {
-    /// The rows of textures, and the means that they have.
+    /// Checks the rows of textures and their means.
     pub(super) fn verify_textures(&self) -> Checked {
         let (rows, means) = (self.textures(), self.means());
         let mut next = 0_u64;

@@ -1,4 +1,4 @@
-//! Whether walks through trees that nobody verified end, and soon.
+//! Whether every walk through unverified trees ends in reasonable time.
 
 use super::groups::parents_of;
 use crate::light_tree::group::{Group, WIDTH};
@@ -7,13 +7,17 @@ use crate::light_tree::records::{TreeKind, TreeRow};
 use crate::light_tree::tree::LightTree;
 
 impl<D: AsRef<[u8]>> LightTree<D> {
-    /// Whether links form trees: every group is reached once, shared trees hold no others, the tree of a
-    /// frame holds that of what stands still at most once, and the trees that one tree places do not
-    /// have more groups, counted as often as they are placed, than the file has groups and emitters.
+    /// Whether links form trees:
     ///
-    /// Links that merely lead onwards would end every walk. But where many lead to one group, and from
-    /// there again, there are more ways down than a walk over all of them ever finishes. So there are
-    /// where many leaves place one large tree.
+    /// - Every group is reached once.
+    /// - A shared tree holds no other trees. The tree of what stands still holds only shared trees.
+    /// - The tree of a frame holds that of what stands still at most once.
+    /// - The trees that one tree places, counted as often as they are placed, have no more groups than
+    ///   the file has groups and emitters.
+    ///
+    /// Every walk ends if links only lead onwards. But if many links lead to one group, and many from
+    /// there to the next, there are too many paths for a walk over all of them to finish. The same is
+    /// true if many leaves place one large tree.
     pub(in crate::light_tree) fn is_walkable(&self) -> bool {
         self.trees().iter().all(|tree| {
             let groups = self.groups_of(tree);
