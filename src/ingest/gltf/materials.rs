@@ -151,7 +151,7 @@ impl Materials {
         if factor.min_element() < 0.0 {
             note("its emissive colour is negative in part; that part is left out".into());
         }
-        // A texture that nothing of is left of is not decoded.
+        // Without any emission its texture is not decoded.
         let texture = row.emissive_texture.as_ref().filter(|_| emission.max_element() > 0.0);
         let texture =
             texture.map(|info| self.textures.texture_use(source, output, info, Coding::Srgb));
@@ -167,7 +167,7 @@ impl Materials {
         }
     }
 
-    /// Adds the textures of what it reflects. Where one cannot be read what stands in for it is neutral.
+    /// Adds the textures of reflection. A texture that cannot be read is replaced by a neutral value.
     fn add_textures(
         &mut self,
         source: &Source,

@@ -120,7 +120,7 @@ impl Found<'_> {
         self.groups.len()
     }
 
-    /// One of them, its leaves linked to what they stand for now.
+    /// One of its groups. Its leaves are linked to the bounds of the new tree.
     pub fn group(&self, at: usize, link: impl Fn(usize) -> Link) -> Group {
         let number = self.groups.start + at;
         let mut group = self.reuse.groups[number];
