@@ -101,16 +101,16 @@ fn join_families<K: Ord>(
     mut rows: [Numbered; 2],
     key: impl Fn(&Light) -> K,
 ) -> (Vec<(u32, u32)>, [Numbered; 2]) {
-    let order = |side: usize, (row, family): &(u32, String)| {
-        (family.clone(), key(&lists[side][*row as usize]))
+    let key_of = |side: usize, row: u32| key(&lists[side][row as usize]);
+    let compare = |sides: [usize; 2], x: &(u32, String), y: &(u32, String)| {
+        x.1.cmp(&y.1).then_with(|| key_of(sides[0], x.0).cmp(&key_of(sides[1], y.0)))
     };
     for side in 0..2 {
         let path = |row: u32| lists[side][row as usize].path;
         rows[side].sort_by(|a, b| {
-            let (x, y) = (order(side, a), order(side, b));
             // Shorter first: 9 comes before 10.
             let place = |row: u32| (path(row).len(), path(row));
-            x.cmp(&y).then_with(|| place(a.0).cmp(&place(b.0)))
+            compare([side; 2], a, b).then_with(|| place(a.0).cmp(&place(b.0)))
         });
     }
     let (mut pairs, mut rest) = (Vec::new(), <[Numbered; 2]>::default());
@@ -118,7 +118,7 @@ fn join_families<K: Ord>(
     let (mut before, mut after) = (before.into_iter().peekable(), after.into_iter().peekable());
     loop {
         let order = match (before.peek(), after.peek()) {
-            (Some(b), Some(a)) => order(0, b).cmp(&order(1, a)),
+            (Some(b), Some(a)) => compare([0, 1], b, a),
             (Some(_), None) => Ordering::Less,
             (None, Some(_)) => Ordering::Greater,
             (None, None) => return (pairs, rest),
