@@ -19,6 +19,7 @@ mod strict;
 mod survey;
 mod textures;
 mod view;
+mod watch;
 
 pub use agreement::{Contradiction, Standing, standing};
 pub use build::{Rebuilt, build_tree, origin_of, rebuild_tree};
@@ -34,6 +35,7 @@ pub use strict::{Strict, StrictError};
 pub use survey::{Group, PlacedLight, SharedBounds, Survey, survey};
 pub use textures::collect_emitters;
 pub use view::{ASPECT, Look, View, ViewError, look};
+pub use watch::{Event, Watch};
 
 use crate::ingest::{self, IngestError};
 use crate::scene::Scene;
