@@ -88,7 +88,7 @@ fn refuse_to_overwrite(arguments: &Arguments, scene: &Scene, frames: &Frames) ->
         let picture = arguments.output.path(frame);
         for output in [picture.with_extension("png"), picture] {
             let is_tree = || arguments.tree.as_ref().is_some_and(|tree| same_file(tree, &output));
-            if scene.files.iter().any(|input| same_file(input, &output)) || is_tree() {
+            if scene.files.iter().any(|input| same_file(&input.path, &output)) || is_tree() {
                 bail!("{}: is an input of this render; choose another name", output.display());
             }
         }
@@ -190,7 +190,7 @@ fn render_frames<D: AsRef<[u8]> + Sync>(
     frames: &Frames,
 ) -> Result<usize> {
     let settings = arguments.settings(camera.aspect);
-    let content = [pipeline::scene_fingerprint(scene)?, program_fingerprint()];
+    let content = [pipeline::scene_fingerprint(scene), program_fingerprint()];
     let place = place_of(scene, &camera);
     let stamp_of = |frame| Stamp::new(&content, (&camera, &place), arguments, &settings, frame);
     let height = settings.height;
