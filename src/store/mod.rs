@@ -13,8 +13,9 @@ mod error;
 mod map;
 mod regular;
 mod rule;
+mod seal;
 
-pub use atomic::{check_writable, write_atomically};
+pub use atomic::{check_room, check_writable, folder_of, sweep, write_atomically};
 pub use bytes::{ALIGNMENT, AlignedBytes};
 pub use container::{Container, ContainerWriter, MAGIC, Section, SectionId, VERSION};
 pub use error::{RULES_OF_HEADER, RULES_OF_TABLE, StoreError};
@@ -23,3 +24,4 @@ pub use memmap2::Mmap;
 pub use regular::{open_regular, read_regular};
 pub(crate) use rule::rules;
 pub use rule::{Record, Rule, Violation};
+pub use seal::{BLANK, is_sealed, set_seal};
