@@ -4,17 +4,18 @@
 //! `Z`, `N.X/Y/Z`, `albedo.R/G/B`, `variance.R/G/B` and `sampleCount` that are asked for. Beauty is half
 //! or float, everything else float. The same buffers give the same bytes. For that reason all metadata is
 //! one JSON text in the attribute [`METADATA`]: crate `exr` keeps custom attributes in a hash map and
-//! would write several in a random order.
+//! would write several in a random order. The text has a [seal](crate::store::set_seal), so that a file with
+//! rot anywhere is not taken for the picture that was written.
 
 use super::buffers::{Pixel, RenderBuffers};
-use crate::store::{open_regular, write_atomically};
+use crate::store::{BLANK, is_sealed, read_regular, set_seal, write_atomically};
 use exr::block::reader::Reader;
 use exr::image::write::WritableImage;
 use exr::image::{AnyChannel, AnyChannels, Encoding, FlatSamples, Image, Layer};
 use exr::meta::attribute::{AttributeValue, Text};
 use exr::meta::header::LayerAttributes;
 use exr::prelude::{SmallVec, f16};
-use std::io::{self, BufReader};
+use std::io::{self, Cursor, Write};
 use std::path::Path;
 
 /// Name of the attribute that holds the JSON text.
@@ -37,43 +38,47 @@ pub struct ExrOptions {
     pub sample_count: bool,
 }
 
-/// Writes a frame, all or nothing. `metadata` is a JSON text.
+/// Larger files are none of ours.
+const MOST_BYTES: u64 = 64 << 30;
+
+/// Writes a frame, all or nothing, and seals it. `metadata` is a JSON object. Returns the length of the file.
 pub fn write_exr(
     path: &Path,
     buffers: &RenderBuffers,
     options: &ExrOptions,
     metadata: &str,
-) -> io::Result<()> {
-    let image = image_of(buffers, options, metadata);
-    write_atomically(path, |file| {
-        let writer = image.write();
-        // Crate exr starts threads of its own, as many as there are cores.
-        let written = if rayon::current_num_threads() > 1 {
-            writer.to_buffered(file)
-        } else {
-            writer.non_parallel().to_buffered(file)
-        };
-        written.map_err(into_io)
-    })
+) -> io::Result<u64> {
+    let mut bytes = Vec::new();
+    let image = image_of(buffers, options, &with_seal(metadata));
+    let writer = image.write();
+    // Crate exr starts threads of its own, as many as there are cores.
+    let written = if rayon::current_num_threads() > 1 {
+        writer.to_buffered(Cursor::new(&mut bytes))
+    } else {
+        writer.non_parallel().to_buffered(Cursor::new(&mut bytes))
+    };
+    written.map_err(into_io)?;
+    set_seal(&mut bytes);
+    write_atomically(path, |file| file.write_all(&bytes))?;
+    Ok(bytes.len() as u64)
 }
 
-/// The JSON text of a file that [`write_exr`] made, if the file is whole. `None` if it is not there,
-/// is no such file, or ends early. Reads the header and the last rows, not the picture.
+/// The JSON text of a file that [`write_exr`] made, if every byte of the file is as it was written. `None`
+/// if it is not there or is no such file.
 pub fn read_metadata(path: &Path) -> Option<String> {
-    let reader =
-        Reader::read_from_buffered(BufReader::new(open_regular(path).ok()?), false).ok()?;
-    let header = reader.headers().first()?;
-    let attribute = header.own_attributes.other.get(METADATA.as_bytes())?;
+    let bytes = read_regular(path, MOST_BYTES).ok()?;
+    let reader = Reader::read_from_buffered(Cursor::new(&bytes), false).ok()?;
+    let attribute = reader.headers().first()?.own_attributes.other.get(METADATA.as_bytes())?;
     let AttributeValue::Text(text) = attribute else { return None };
     let text = text.to_string();
-    // Rows are stored from the top: the file is whole if its last block is.
-    let height = header.layer_size.height();
-    let is_last = |_: &_, _, block: exr::block::BlockIndex| {
-        block.pixel_position.y() + block.pixel_size.height() >= height
-    };
-    let mut blocks = reader.filter_chunks(true, is_last).ok()?;
-    blocks.try_for_each(|block| block.map(drop)).ok()?;
-    Some(text)
+    is_sealed(bytes).then_some(text)
+}
+
+/// A JSON object with a blank seal as its first member.
+fn with_seal(metadata: &str) -> String {
+    let members = metadata.trim_start().strip_prefix('{').unwrap_or("}").trim_start();
+    let comma = if members.starts_with('}') { "" } else { "," };
+    format!("{{\"seal\":\"{BLANK}\"{comma}{members}")
 }
 
 fn image_of(
@@ -272,13 +277,24 @@ mod tests {
         write_exr(&path, &frame(), &ALL, json).unwrap();
         let text = read_metadata(&path).unwrap();
         let parse = |text: &str| serde_json::from_str::<serde_json::Value>(text).unwrap();
-        assert_eq!(parse(&text), parse(json));
+        let mut read = parse(&text);
+        assert!(read.as_object_mut().unwrap().remove("seal").is_some());
+        assert_eq!(read, parse(json));
         let whole = fs::read(&path).unwrap();
         let part = folder.path().join("part.exr");
         for length in [0, 3, 100, whole.len() / 2, whole.len() - 100, whole.len() - 1] {
             fs::write(&part, &whole[..length]).unwrap();
             assert_eq!(read_metadata(&part), None, "{length} bytes of {}", whole.len());
         }
+        // Rot anywhere: blocks that could not be compressed have no checksum of their own.
+        for at in (0..whole.len()).step_by(97) {
+            let mut rotten = whole.clone();
+            rotten[at] ^= 16;
+            fs::write(&part, &rotten).unwrap();
+            assert_eq!(read_metadata(&part), None, "byte {at}");
+        }
+        write_exr(&path, &frame(), &NONE, "{}").unwrap();
+        assert!(read_metadata(&path).is_some());
         fs::write(&part, vec![b'x'; 5000]).unwrap();
         assert_eq!(read_metadata(&part), None);
         assert_eq!(read_metadata(&folder.path().join("absent.exr")), None);

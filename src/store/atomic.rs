@@ -86,10 +86,12 @@ pub fn sweep(folder: &Path) {
     for path in entries.flatten().map(|entry| entry.path()) {
         let name = path.file_name().and_then(|name| name.to_str()).unwrap_or_default();
         let is_file = || fs::symlink_metadata(&path).is_ok_and(|there| there.is_file());
-        if name.starts_with(PREFIX)
-            && name.ends_with(SUFFIX)
-            && is_file()
-            && File::open(&path).is_ok_and(|file| file.try_lock().is_ok())
+        if !(name.starts_with(PREFIX) && name.ends_with(SUFFIX) && is_file()) {
+            continue;
+        }
+        // Locked until it is removed: a writer that comes late sees that it has lost the file.
+        if let Ok(file) = File::open(&path)
+            && file.try_lock().is_ok()
         {
             let _ = fs::remove_file(&path);
         }
@@ -136,8 +138,9 @@ fn replace(
     write(&mut buffer)?;
     buffer.flush()?;
     buffer.get_ref().sync_all()?;
-    drop(buffer);
+    // Open, and so locked, until it has its own name.
     name.persist(path)?;
+    drop(buffer);
     // The rename itself lives in the folder. Not every system lets a folder be opened; the file is
     // whole either way.
     if let Ok(folder) = File::open(folder) {
@@ -231,19 +234,16 @@ mod tests {
     #[test]
     fn a_sweeper_takes_nothing_from_writers() {
         let folder = tempfile::tempdir().unwrap();
-        let done = std::sync::atomic::AtomicUsize::new(0);
-        let write = |name: &str| {
+        let write = &|name: &str| {
             for _ in 0..200 {
                 let path = folder.path().join(name);
                 write_atomically(&path, |file| file.write_all(name.as_bytes())).unwrap();
                 assert_eq!(fs::read_to_string(&path).unwrap(), name);
             }
-            done.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
         };
         std::thread::scope(|scope| {
-            scope.spawn(|| write("a"));
-            scope.spawn(|| write("b"));
-            while done.load(std::sync::atomic::Ordering::Relaxed) < 2 {
+            let writers = ["a", "b"].map(|name| scope.spawn(move || write(name)));
+            while !writers.iter().all(|writer| writer.is_finished()) {
                 sweep(folder.path());
             }
         });
