@@ -14,7 +14,9 @@ mod frames;
 mod fresh;
 mod look;
 pub mod option;
+mod render_job;
 mod rig;
+mod stamp;
 mod strict;
 mod survey;
 mod textures;
@@ -30,7 +32,11 @@ pub use fresh::{
     OpenedTree, StaleTree, TreeError, check_agreement, check_fresh, check_output, is_tree_file,
     open_base, open_tree,
 };
+pub use render_job::{
+    FrameCounts, Preview, RenderError, RenderJob, RenderReport, SceneCounts, Seconds,
+};
 pub use rig::carry_camera;
+pub use stamp::{PreviewStamp, Stamp, Stamper};
 pub use strict::{Strict, StrictError};
 pub use survey::{Group, PlacedLight, SharedBounds, Survey, survey};
 pub use textures::collect_emitters;

@@ -62,6 +62,11 @@ impl RenderBuffers {
         self.height
     }
 
+    /// Bytes of all values.
+    pub fn byte_length(&self) -> u64 {
+        size_of_val(self.pixels()) as u64
+    }
+
     /// All pixels, row after row.
     pub fn pixels(&self) -> &[Pixel] {
         &self.pixels

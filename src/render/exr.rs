@@ -7,6 +7,7 @@
 //! would write several in a random order. The text has a [seal](crate::store::set_seal), so that a file with
 //! rot anywhere is not taken for the picture that was written.
 
+use super::beauty::half;
 use super::buffers::{Pixel, RenderBuffers};
 use crate::store::{BLANK, is_sealed, read_regular, set_seal, write_atomically};
 use exr::block::reader::Reader;
@@ -14,7 +15,7 @@ use exr::image::write::WritableImage;
 use exr::image::{AnyChannel, AnyChannels, Encoding, FlatSamples, Image, Layer};
 use exr::meta::attribute::{AttributeValue, Text};
 use exr::meta::header::LayerAttributes;
-use exr::prelude::{SmallVec, f16};
+use exr::prelude::SmallVec;
 use std::io::{self, Cursor, Write};
 use std::path::Path;
 
@@ -132,9 +133,8 @@ impl Channels<'_> {
         if float {
             return self.add(name.into(), value);
         }
-        let largest = f32::from(f16::MAX);
-        let half = |pixel| f16::from_f32(value(pixel).clamp(-largest, largest));
-        let samples = FlatSamples::F16(self.pixels.iter().map(half).collect());
+        let samples =
+            FlatSamples::F16(self.pixels.iter().map(|pixel| half(value(pixel))).collect());
         self.list.push(AnyChannel::new(name, samples));
     }
 }

@@ -15,9 +15,10 @@
 //! | [`surface`] | what is there: normals, textures, material? |
 //! | [`bsdf`] | how does it reflect? |
 //! | [`buffers`] | what is kept of a frame? |
-//! | [`exr`], [`png`] | how does it get to the disk? |
+//! | [`exr`], [`beauty`], [`png`] | how does it get to the disk? |
 //! | [`frames`], [`frame_names`] | which frames, and under which names? |
 
+pub mod beauty;
 pub mod bsdf;
 pub mod buffers;
 pub mod camera;
