@@ -2,7 +2,7 @@
 //!
 //! Not a measurement: the EXR beside it is. Beauty is scaled by `2^exposure`, bent by Narkowicz's
 //! fit of the ACES film curve (2016; 1 becomes 0.80, whites roll off) and encoded as sRGB, over
-//! black. Scenes in photometric units are thousands of nits bright, so the exposure can be chosen
+//! black. A part of a frame gives a preview of that part alone. Scenes in photometric units are thousands of nits bright, so the exposure can be chosen
 //! from the picture: [`exposure_for`].
 
 use super::buffers::RenderBuffers;
@@ -21,7 +21,7 @@ pub fn write_png(path: &Path, buffers: &RenderBuffers, exposure_stops: f32) -> i
     let scale = exposure_stops.exp2();
     let encode = |linear: f32| (linear_to_srgb(film(linear * scale)) * 255.0 + 0.5) as u8;
     let bytes: Vec<u8> =
-        buffers.pixels().iter().flat_map(|pixel| pixel.beauty.to_array().map(encode)).collect();
+        buffers.beauty().flat_map(|beauty| beauty.to_array().map(encode)).collect();
     write_atomically(path, |file| {
         PngEncoder::new(file)
             .write_image(&bytes, buffers.width(), buffers.height(), ExtendedColorType::Rgb8)
@@ -34,9 +34,8 @@ pub fn write_png(path: &Path, buffers: &RenderBuffers, exposure_stops: f32) -> i
 pub fn exposure_for(buffers: &RenderBuffers) -> f32 {
     let lit = |color: Rgb| Some(f64::from(luminance(color))).filter(|y| *y > 0.0 && y.is_finite());
     let (sum, count) = buffers
-        .pixels()
-        .iter()
-        .filter_map(|pixel| lit(pixel.beauty))
+        .beauty()
+        .filter_map(lit)
         .fold((0.0, 0_u32), |(sum, count), y| (sum + y.log2(), count + 1));
     if count == 0 { 0.0 } else { (MIDDLE_GREY.log2() - sum / f64::from(count)) as f32 }
 }
@@ -51,6 +50,13 @@ fn film(x: f32) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::render::crop::Window;
+    use crate::render::layers::layers_of;
+
+    fn black(width: u32, height: u32) -> RenderBuffers {
+        let window = Window::whole(width, height);
+        RenderBuffers::new([width, height], window, layers_of(&[], true, &[]))
+    }
 
     #[test]
     fn brighter_stays_brighter_and_wild_values_stay_inside() {
@@ -63,23 +69,22 @@ mod tests {
     #[test]
     fn the_exposure_brings_any_brightness_to_the_middle() {
         for level in [1e-6, 1.0, 1e9] {
-            let mut buffers = RenderBuffers::new(8, 8);
-            buffers.pixels_mut()[0].beauty = Rgb::NAN;
-            for pixel in &mut buffers.pixels_mut()[2..] {
-                pixel.beauty = Rgb::splat(level);
-            }
+            let mut buffers = black(8, 8);
+            (0..64).for_each(|i| buffers.set(i % 8, i / 8, &[level; 4]));
+            buffers.set(0, 0, &[f32::NAN; 4]);
+            buffers.set(1, 0, &[0.0; 4]);
             let scaled = level * exposure_for(&buffers).exp2();
             assert!((scaled / 0.18 - 1.0).abs() < 1e-4);
         }
-        assert_eq!(exposure_for(&RenderBuffers::new(2, 2)), 0.0);
+        assert_eq!(exposure_for(&black(2, 2)), 0.0);
     }
 
     #[test]
     fn the_file_reads_back() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("p/preview.png");
-        let mut buffers = RenderBuffers::new(3, 2);
-        buffers.pixels_mut()[4].beauty = Rgb::new(1e6, 0.0, f32::NAN);
+        let mut buffers = black(3, 2);
+        buffers.set(1, 1, &[1e6, 0.0, f32::NAN, 1.0]);
         write_png(&path, &buffers, 0.0).unwrap();
         let read = image::open(&path).unwrap().into_rgb8();
         assert_eq!(read.dimensions(), (3, 2));

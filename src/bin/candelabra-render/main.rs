@@ -9,6 +9,7 @@ mod texture_bar;
 use arguments::Arguments;
 use candelabra::page::Plain;
 use candelabra::pipeline::{TreeError, ViewError};
+use candelabra::render::PlanError;
 use candelabra::render::frame_names::FrameNamesError;
 use clap::Parser;
 use std::process::ExitCode;
@@ -42,7 +43,10 @@ fn main() -> ExitCode {
 
 /// Whether the options contradict each other although each is valid by itself.
 fn is_usage(error: &anyhow::Error) -> bool {
-    error.is::<FrameNamesError>() || error.downcast_ref().is_some_and(ViewError::is_usage)
+    let is_crop = matches!(error.downcast_ref(), Some(PlanError::Crop(_)));
+    is_crop
+        || error.is::<FrameNamesError>()
+        || error.downcast_ref().is_some_and(ViewError::is_usage)
 }
 
 /// Whether the tree file itself is at fault; not one that is absent.

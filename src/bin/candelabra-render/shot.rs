@@ -8,7 +8,7 @@ use candelabra::emitter::Emitters;
 use candelabra::light_tree::{ALGORITHM_VERSION, LightTree};
 use candelabra::page::Plain;
 use candelabra::pipeline::{self, OpenedTree};
-use candelabra::render::exr::{ExrOptions, read_metadata, write_exr};
+use candelabra::render::exr::{read_metadata, write_exr};
 use candelabra::render::frames::Frames;
 use candelabra::render::png::{exposure_for, write_png};
 use candelabra::render::{RenderDelegate, RenderSettings};
@@ -158,10 +158,10 @@ impl Stamp {
         let settings = serde_json::to_value(settings)?;
         let mut hasher = blake3::Hasher::new();
         hasher.update(content.as_flattened());
-        let (float, sound) = (arguments.float, !arguments.no_verify);
+        let sound = !arguments.no_verify;
         let (fog, forced) = (&arguments.fog, &arguments.force_light);
         let rest = format!(
-            "{SOFTWARE} {ALGORITHM_VERSION} {camera:?} {place:?} {fog:?} {forced:?} {float} {sound} \
+            "{SOFTWARE} {ALGORITHM_VERSION} {camera:?} {place:?} {fog:?} {forced:?} {sound} \
              {settings} {frame}"
         );
         hasher.update(rest.as_bytes());
@@ -193,7 +193,8 @@ fn render_frames<D: AsRef<[u8]> + Sync>(
     let content = [pipeline::scene_fingerprint(scene)?, program_fingerprint()];
     let place = place_of(scene, &camera);
     let stamp_of = |frame| Stamp::new(&content, (&camera, &place), arguments, &settings, frame);
-    let height = settings.height;
+    settings.check(scene, emitters)?;
+    let height = settings.window()?.height();
     let bar = Bar::new(frames.as_slice().len(), height);
     // Prepared when the first frame needs it: a finished shot resumes at once.
     let mut delegate = None;
@@ -259,26 +260,24 @@ fn render_frame<D: AsRef<[u8]> + Sync>(
     let started = Instant::now();
     let rendered = delegate.render(stamp.frame, bar)?;
     let seconds = started.elapsed().as_secs_f64();
-    let options = ExrOptions {
-        float_beauty: arguments.float,
-        depth: true,
-        normal: true,
-        albedo: true,
-        variance: true,
-        sample_count: true,
-    };
     let metadata = serde_json::to_string(stamp)?;
-    write_exr(path, &rendered.buffers, &options, &metadata)
-        .with_context(|| "writing the picture")?;
+    write_exr(path, &rendered.buffers, &metadata).with_context(|| "writing the picture")?;
     if arguments.png {
         // One exposure for the shot, or the previews would flicker.
         let stops = *exposure.get_or_insert_with(|| exposure_for(&rendered.buffers));
         write_png(&path.with_extension("png"), &rendered.buffers, stops)
             .with_context(|| "writing the preview")?;
     }
-    let stats = rendered.stats;
+    let stats = rendered.stats.trace;
+    let left_out = match rendered.stats.first_non_finite {
+        Some((x, y)) => format!(
+            ", {} samples were infinite or no number and were left out, the first in pixel ({x}, {y})",
+            rendered.stats.non_finite
+        ),
+        None => String::new(),
+    };
     Ok(format!(
-        "frame {}: {seconds:.2} s, {:.2} million rays a second, {} light picks -> {}",
+        "frame {}: {seconds:.2} s, {:.2} million rays a second, {} light picks{left_out} -> {}",
         stamp.frame,
         stats.rays as f64 / seconds / 1e6,
         stats.light_picks,
