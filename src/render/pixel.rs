@@ -124,7 +124,10 @@ impl PixelMean {
                 Aov::Depth if self.covered == 0 => values.push(f32::INFINITY),
                 Aov::Depth => values.push((self.depth_m / covered) as f32),
                 Aov::Normal => values.extend(self.normal.normalize_or_zero().to_array()),
-                Aov::Albedo => values.extend((self.albedo / count).as_vec3().to_array()),
+                Aov::Albedo => {
+                    let albedo = (self.albedo / count).as_vec3();
+                    values.extend(albedo.clamp(Rgb::ZERO, Rgb::ONE).to_array());
+                }
                 Aov::Position if self.covered == 0 => values.extend([0.0; 3]),
                 Aov::Position => {
                     let position = self.position / covered + shown.origin;
