@@ -17,7 +17,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from pxr import Sdf, Usd, UsdLux
 
-from . import light_visibility
+from . import light_groups, light_visibility
 from .light_attributes import LightAttributes, is_finite
 from .light_losses import report_losses
 from .report import Notebook
@@ -74,6 +74,8 @@ class Light:
     material_sync: str = "noMaterialResponse"
     inputs: dict = field(default_factory=dict)
     visibility: dict = field(default_factory=dict)
+    group: str | None = None
+    """The light group that it is in, if the stage names one."""
 
     @property
     def extras(self) -> dict:
@@ -87,6 +89,8 @@ class Light:
             extras["force"] = True
         if self.visibility:
             extras["visibility"] = self.visibility
+        if self.group is not None:
+            extras["group"] = self.group
         return extras
 
 
@@ -115,6 +119,7 @@ def read_light(prim: Usd.Prim, kind: str, frames: Frames, report: Notebook) -> L
         material_sync=str(prim.GetAttribute("light:materialSyncMode").Get() or "noMaterialResponse"),
         inputs=_verbatim(inputs),
         visibility=light_visibility.read_visibility(prim, frames.first, report),
+        group=light_groups.read_group(prim, frames.first, report),
     )
     _measure(light, inputs)
     if kind == "DistantLight":
@@ -127,7 +132,8 @@ def read_light(prim: Usd.Prim, kind: str, frames: Frames, report: Notebook) -> L
         up = prim.GetStage().GetMetadata("upAxis")
         light.pole_z = pole == "Z" or (pole == "scene" and up == "Z")
     report_losses(inputs)
-    read = inputs.names | light_visibility.NAMES | {"filters", "treatAsPoint", "treatAsLine"}
+    read = inputs.names | light_visibility.NAMES | set(light_groups.NAMES)
+    read |= {"filters", "treatAsPoint", "treatAsLine"}
     report_others(prim, read, frames.first, report)
     return light
 

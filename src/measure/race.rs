@@ -5,9 +5,8 @@
 //! another entrant's error follows, because error times time is constant as samples are added. Stratified
 //! samples do better than that, so each entrant should get about as many samples as it needs.
 
-use crate::light_tree::NoSuchFrame;
 use crate::math::color::luminance;
-use crate::render::{RenderDelegate, RenderSettings};
+use crate::render::{RenderDelegate, RenderError, RenderSettings};
 use serde::Serialize;
 use std::time::Instant;
 
@@ -50,13 +49,13 @@ pub struct Result {
 /// Runs a race. `done` is called after every picture.
 ///
 /// # Errors
-/// If the tree lacks the frame.
+/// If the tree lacks the frame, or settings do not fit the scene.
 pub fn race<D: AsRef<[u8]> + Sync>(
     delegate: &mut RenderDelegate<D>,
     entrants: &[Entrant],
     options: &RaceOptions,
     mut done: impl FnMut(),
-) -> std::result::Result<Vec<Result>, NoSuchFrame> {
+) -> std::result::Result<Vec<Result>, RenderError> {
     let mut results: Vec<Result> = Vec::new();
     for entrant in entrants {
         let mut times = Vec::new();
@@ -68,11 +67,10 @@ pub fn race<D: AsRef<[u8]> + Sync>(
             let started = Instant::now();
             let rendered = delegate.render(options.frame, &())?;
             times.push(started.elapsed().as_secs_f64());
-            lights += rendered.stats.light_picks;
-            let pixels = rendered.buffers.pixels();
-            sums.resize(pixels.len(), [0.0; 2]);
-            for (sum, pixel) in sums.iter_mut().zip(pixels) {
-                let value = f64::from(luminance(pixel.beauty));
+            lights += rendered.stats.trace.light_picks;
+            sums.resize(rendered.buffers.beauty().count(), [0.0; 2]);
+            for (sum, beauty) in sums.iter_mut().zip(rendered.buffers.beauty()) {
+                let value = f64::from(luminance(beauty));
                 sum[0] += value;
                 sum[1] += value * value;
             }

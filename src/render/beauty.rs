@@ -24,8 +24,7 @@ impl Beauty {
     /// What a file keeps of a frame: 32-bit floats, or 16-bit ones.
     pub fn of(buffers: &RenderBuffers, float: bool) -> Beauty {
         let stored = |value: f32| if float { value } else { half(value).to_f32() };
-        let pixels = buffers.pixels().iter().map(|pixel| pixel.beauty);
-        let pixels = pixels.map(|rgb| Rgb::from(rgb.to_array().map(stored))).collect();
+        let pixels = buffers.beauty().map(|rgb| Rgb::from(rgb.to_array().map(stored))).collect();
         Beauty { width: buffers.width(), height: buffers.height(), pixels }
     }
 
@@ -63,26 +62,27 @@ pub(super) fn half(value: f32) -> f16 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::render::exr::{ExrOptions, write_exr};
+    use crate::render::crop::Window;
+    use crate::render::exr::write_exr;
+    use crate::render::layers::{Aov, layers_of};
 
     #[test]
     fn what_is_read_is_what_was_kept() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("f.exr");
-        let mut buffers = RenderBuffers::new(7, 3);
-        for (i, pixel) in buffers.pixels_mut().iter_mut().enumerate() {
-            pixel.beauty = Rgb::new(0.1, 1e-9, 1e6) * i as f32;
-        }
         for float in [false, true] {
-            let options = ExrOptions {
-                float_beauty: float,
-                depth: true,
-                normal: false,
-                albedo: true,
-                variance: true,
-                sample_count: false,
-            };
-            write_exr(&path, &buffers, &options, "{}").unwrap();
+            let layers = layers_of(&Aov::DEFAULT, float, &[]);
+            let channels: usize = layers.iter().map(|layer| layer.channels.len()).sum();
+            let window = Window { x0: 2, y0: 1, x1: 9, y1: 4 };
+            let mut buffers = RenderBuffers::new([20, 10], window, layers);
+            for (x, y) in (0..7).flat_map(|x| (0..3).map(move |y| (x, y))) {
+                let mut values = vec![0.5; channels];
+                for (value, scale) in values.iter_mut().zip([0.1, 1e-9, 1e6]) {
+                    *value = scale * (x + 7 * y) as f32;
+                }
+                buffers.set(x, y, &values);
+            }
+            write_exr(&path, &buffers, "{}").unwrap();
             let read = Beauty::read(&path).unwrap();
             assert_eq!(read, Beauty::of(&buffers, float));
             assert_eq!((read.width, read.height), (7, 3));

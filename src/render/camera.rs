@@ -11,7 +11,7 @@
 
 use crate::math::warp;
 use crate::scene::{Camera, Pose, Projection};
-use glam::{DVec3, Vec2, Vec3};
+use glam::{DVec2, DVec3, Vec2, Vec3};
 
 /// A camera at one time and one resolution.
 #[derive(Clone, Copy, Debug)]
@@ -114,6 +114,30 @@ impl CameraRays {
     #[inline]
     pub fn depth_m(&self, point: Vec3) -> f32 {
         (point - self.position).dot(self.forward)
+    }
+
+    /// Where a world-space point is on the picture, seen through the middle of the lens: pixels to the
+    /// right and up from where the view axis is. `None` behind a perspective camera.
+    pub fn project(&self, point: DVec3) -> Option<DVec2> {
+        self.on_film(point - self.position.as_dvec3())
+    }
+
+    /// The same for a direction to a point that is infinitely far. `None` without perspective.
+    pub fn project_direction(&self, direction: Vec3) -> Option<DVec2> {
+        let has_perspective = !matches!(self.optics, Optics::Parallel);
+        has_perspective.then(|| self.on_film(direction.as_dvec3())).flatten()
+    }
+
+    fn on_film(&self, toward: DVec3) -> Option<DVec2> {
+        let [right, up, forward] = [self.right, self.up, self.forward].map(|axis| axis.as_dvec3());
+        let on_film = DVec2::new(toward.dot(right), toward.dot(up)) / f64::from(self.pixel_m);
+        match self.optics {
+            Optics::Parallel => Some(on_film),
+            _ => {
+                let depth = toward.dot(forward);
+                (depth > 0.0).then(|| on_film / depth)
+            }
+        }
     }
 }
 

@@ -1,10 +1,15 @@
 //! The render delegate: a shot prepared once, its frames rendered one after the other.
 
-use super::buffers::{Pixel, RenderBuffers};
+use super::buffers::{RenderBuffers, set_pixel};
 use super::camera::CameraRays;
+use super::crop::Window;
 use super::fog::Fog;
-use super::path::{Integrator, PathSample, PathScratch, TraceStats};
+use super::layers::Aov;
+use super::motion::Motion;
+use super::path::{Integrator, PathScratch, TraceStats};
 use super::picker::LightPicker;
+use super::pixel::{PixelMean, Shown};
+use super::plan::{Plan, PlanError};
 use super::rays::RayScene;
 use super::settings::RenderSettings;
 use super::surface::Surfaces;
@@ -12,8 +17,11 @@ use crate::emitter::{Emitters, PosedEmitters, infinite_lights};
 use crate::light_tree::{LeafTable, LightTree, NoSuchFrame};
 use crate::math::random::hash;
 use crate::scene::{Camera, Scene};
-use glam::{DVec3, Vec3};
 use rayon::prelude::*;
+use thiserror::Error;
+
+/// After so many pixels of a row it is asked whether to stop: a row of a large picture takes long.
+const PIXELS_BETWEEN_STOPS: usize = 16;
 
 /// What does not change between the frames of a shot: geometry, textures, ray acceleration, the
 /// mapped tree.
@@ -24,21 +32,64 @@ pub struct RenderDelegate<'a, D> {
     static_leaves: LeafTable,
     geometry: RayScene,
     settings: RenderSettings,
+    plan: Result<Plan, PlanError>,
     camera: Camera,
 }
 
-/// A finished frame.
+/// Why there is no frame.
+#[derive(Debug, Error)]
+pub enum RenderError {
+    /// The tree lacks it.
+    #[error(transparent)]
+    NoSuchFrame(#[from] NoSuchFrame),
+    /// The settings do not fit.
+    #[error(transparent)]
+    Plan(#[from] PlanError),
+    /// [`Progress::is_stopped`] said so.
+    #[error("stopped before the frame was finished; nothing of it is kept")]
+    Stopped,
+}
+
+/// A finished frame. It owns its pixels, so that another thread can write it.
+#[derive(Clone, Debug, PartialEq)]
 pub struct RenderedFrame {
     /// Its pixels.
     pub buffers: RenderBuffers,
-    /// What it cost.
-    pub stats: TraceStats,
+    /// What it cost, and what was left out.
+    pub stats: FrameStats,
+}
+
+/// What a frame cost, and what was left out.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct FrameStats {
+    /// Rays and picks.
+    pub trace: TraceStats,
+    /// Samples left out of their pixels because their radiance was infinite or no number.
+    pub non_finite: u64,
+    /// The first pixel with such a sample, row by row: column and row of the whole picture.
+    pub first_non_finite: Option<(u32, u32)>,
+}
+
+impl FrameStats {
+    /// Of two parts of a frame, the upper one first.
+    fn plus(self, below: FrameStats) -> FrameStats {
+        FrameStats {
+            trace: self.trace.plus(below.trace),
+            non_finite: self.non_finite + below.non_finite,
+            first_non_finite: self.first_non_finite.or(below.first_non_finite),
+        }
+    }
 }
 
 /// Receives the progress of a frame.
 pub trait Progress: Sync {
     /// Some of the frame's rows are done.
     fn rows_done(&self, rows: u64);
+
+    /// Whether the frame is to be given up. Asked often, from all threads.
+    fn is_stopped(&self) -> bool {
+        false
+    }
 }
 
 /// Ignores progress.
@@ -65,6 +116,7 @@ impl<'a, D: AsRef<[u8]> + Sync> RenderDelegate<'a, D> {
             tree,
             static_leaves: tree.leaf_table(),
             geometry: RayScene::new(scene, &scene.pose_at(0.0)),
+            plan: Plan::new(scene, emitters, &settings),
             settings,
             camera,
         }
@@ -72,6 +124,7 @@ impl<'a, D: AsRef<[u8]> + Sync> RenderDelegate<'a, D> {
 
     /// Renders with other settings from now on.
     pub fn set_settings(&mut self, settings: RenderSettings) {
+        self.plan = Plan::new(self.scene, self.emitters, &settings);
         self.settings = settings;
     }
 
@@ -97,97 +150,94 @@ impl<'a, D: AsRef<[u8]> + Sync> RenderDelegate<'a, D> {
             picker: LightPicker::new(&self.settings, tree, &infinite),
             camera: CameraRays::new(&self.camera, &pose, width, height),
             fog: Fog::new(self.scene, &pose, &self.camera),
+            groups: self.plan.as_ref().ok().and_then(|plan| plan.groups.as_ref()),
         }))
     }
 
-    /// Renders one frame. The picture depends on scene, settings and frame number alone.
+    /// Renders one frame, or the part of it that is to be rendered. The pixels depend on scene, settings
+    /// and frame number alone; those of a part are the whole frame's.
     ///
     /// # Errors
-    /// If the tree lacks the frame.
+    /// If the tree lacks the frame, the settings do not fit the scene, or `progress` stops it.
     pub fn render(
         &self,
         frame: i32,
         progress: &impl Progress,
-    ) -> Result<RenderedFrame, NoSuchFrame> {
-        self.at_frame(frame, |integrator| self.render_with(integrator, frame, progress))
+    ) -> Result<RenderedFrame, RenderError> {
+        let plan = self.plan.as_ref().map_err(Clone::clone)?;
+        self.at_frame(frame, |integrator| self.render_with(integrator, plan, frame, progress))?
+            .ok_or(RenderError::Stopped)
     }
 
+    /// `None` if it was stopped.
     fn render_with(
         &self,
         integrator: &Integrator,
+        plan: &Plan,
         frame: i32,
         progress: &impl Progress,
-    ) -> RenderedFrame {
-        let (width, height) = (self.settings.width, self.settings.height);
-        let exposure_scale = f64::from(self.camera.exposure_scale);
+    ) -> Option<RenderedFrame> {
+        let size = [self.settings.width, self.settings.height];
+        let shows_motion = plan.layers.iter().any(|layer| layer.aov == Aov::Motion);
+        let pose = integrator.emitters.pose;
+        let shown = Shown {
+            layers: &plan.layers,
+            exposure_scale: self.camera.exposure_scale.into(),
+            origin: self.scene.origin,
+            motion: shows_motion.then(|| Motion::new(self.scene, pose, &self.camera, frame, size)),
+            ids: plan.ids.as_ref(),
+        };
         let frame_seed = hash(self.settings.seed, frame as u32);
-        let mut buffers = RenderBuffers::new(width, height);
+        let mut buffers = RenderBuffers::new(size, plan.window, plan.layers.clone());
         let stats = buffers
-            .pixels_mut()
-            .par_chunks_mut(width as usize)
-            .enumerate()
-            .map(|(y, row)| {
-                let mut scratch = PathScratch::default();
-                for (x, pixel) in row.iter_mut().enumerate() {
-                    let seed = hash(frame_seed, y as u32 * width + x as u32);
-                    let mut mean = PixelMean::default();
-                    for index in 0..self.settings.samples {
-                        mean.add(&integrator.trace(x as u32, y as u32, seed, index, &mut scratch));
-                    }
-                    *pixel = mean.finish(exposure_scale);
-                }
+            .rows_mut()
+            .zip(plan.window.y0..plan.window.y1)
+            .map(|(row, y)| {
+                let stats = self.render_row(
+                    integrator,
+                    &shown,
+                    (frame_seed, plan.window, y),
+                    row,
+                    progress,
+                )?;
                 progress.rows_done(1);
-                scratch.stats
+                Some(stats)
             })
-            .reduce(TraceStats::default, TraceStats::plus);
-        RenderedFrame { buffers, stats }
-    }
-}
-
-/// Running means over a pixel's samples, in double precision.
-#[derive(Default)]
-struct PixelMean {
-    count: u32,
-    covered: u32,
-    radiance: DVec3,
-    /// Sum of squared distances from the mean (Welford).
-    spread: DVec3,
-    depth_m: f64,
-    normal: Vec3,
-    albedo: DVec3,
-}
-
-impl PixelMean {
-    fn add(&mut self, sample: &PathSample) {
-        self.count += 1;
-        let radiance = sample.radiance.as_dvec3();
-        let off = radiance - self.radiance;
-        self.radiance += off / f64::from(self.count);
-        self.spread += off * (radiance - self.radiance);
-        if sample.covered {
-            self.covered += 1;
-            self.depth_m += f64::from(sample.depth_m);
-            self.normal += sample.normal;
-            self.albedo += sample.albedo.as_dvec3();
-        }
+            .try_reduce(FrameStats::default, |above, below| Some(above.plus(below)))?;
+        buffers.manifest = plan.ids.as_ref().map(|ids| ids.manifest(self.scene, &buffers));
+        Some(RenderedFrame { buffers, stats })
     }
 
-    /// The pixel, exposed: radiance is scaled, and its variance by the square.
-    fn finish(&self, exposure_scale: f64) -> Pixel {
-        let count = f64::from(self.count.max(1));
-        let degrees = count * (count - 1.0).max(1.0);
-        Pixel {
-            beauty: (self.radiance * exposure_scale).as_vec3(),
-            alpha: (f64::from(self.covered) / count) as f32,
-            depth_m: if self.covered > 0 {
-                (self.depth_m / f64::from(self.covered)) as f32
-            } else {
-                f32::INFINITY
-            },
-            normal: self.normal.normalize_or_zero(),
-            albedo: (self.albedo / count).as_vec3(),
-            variance: (self.spread / degrees * exposure_scale.powi(2)).as_vec3(),
-            samples: self.count,
+    fn render_row(
+        &self,
+        integrator: &Integrator,
+        shown: &Shown,
+        (frame_seed, window, y): (u32, Window, u32),
+        row: &mut [f32],
+        progress: &impl Progress,
+    ) -> Option<FrameStats> {
+        let (mut scratch, mut mean, mut values) =
+            (PathScratch::default(), PixelMean::default(), Vec::new());
+        let mut stats = FrameStats::default();
+        for (at, x) in (window.x0..window.x1).enumerate() {
+            if at % PIXELS_BETWEEN_STOPS == 0 && progress.is_stopped() {
+                return None;
+            }
+            // A pixel's number is its place in the whole picture, so that a part of it has the same noise.
+            let seed = hash(frame_seed, y * self.settings.width + x);
+            mean.clear();
+            for index in 0..self.settings.samples {
+                let sample = integrator.trace(x, y, seed, index, &mut scratch);
+                mean.add(&sample, &scratch.by_group, shown);
+            }
+            mean.finish(shown, &mut values);
+            set_pixel(row, window.width() as usize, at, &values);
+            if mean.non_finite > 0 {
+                stats.non_finite += u64::from(mean.non_finite);
+                stats.first_non_finite.get_or_insert((x, y));
+            }
         }
+        stats.trace = scratch.stats;
+        Some(stats)
     }
 }

@@ -24,17 +24,19 @@ pub struct Incoming {
 
 impl Integrator<'_> {
     /// What a vertex reflects of the lights that are picked for it. `u_pick` picks the lights, `u` samples
-    /// points on them, and `salt` is a hash of the pixel and the bounce.
+    /// points on them, and `salt` is a hash of the pixel and the bounce. `throughput` is the share of the
+    /// reflected light that gets to the eye: for the light groups alone, the result is without it.
     pub(super) fn direct(
         &self,
         vertex: &Vertex,
         wanted: &Wanted,
         (u_pick, u, salt): (f32, Vec2, u32),
         accept: &impl Fn(u32, u32, Vec2) -> bool,
+        throughput: Rgb,
         scratch: &mut PathScratch,
     ) -> Rgb {
         let mut sum = Rgb::ZERO;
-        let PathScratch { picks, stats, .. } = scratch;
+        let PathScratch { picks, stats, by_group, .. } = scratch;
         let several = self.picker.takes_several();
         self.picker.pick(wanted, u_pick, salt, picks, |pick| {
             stats.light_picks += 1;
@@ -47,7 +49,9 @@ impl Integrator<'_> {
                 return;
             }
             stats.rays += 1;
-            sum += reflected * self.arriving(&vertex.anchor, &incoming, accept);
+            let light = reflected * self.arriving(&vertex.anchor, &incoming, accept);
+            self.count_in_group(pick.light, throughput * light, by_group);
+            sum += light;
         });
         sum
     }

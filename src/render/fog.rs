@@ -169,13 +169,15 @@ impl Integrator<'_> {
         Some(Drawn { t: from + drawn.t, ..drawn })
     }
 
-    /// Light that the fog along a stretch of a ray scatters, once, towards the ray's origin.
+    /// Light that the fog along a stretch of a ray scatters, once, towards the ray's origin. `throughput`
+    /// is the share of it that gets to the eye: for the light groups alone, the result is without it.
     pub(super) fn scattered(
         &self,
         fog: &Fog,
         (origin, direction, length): (Vec3, Vec3, f32),
         ([u_pick, u_place, lu, lv], salt): ([f32; 4], u32),
         accept: &impl Fn(u32, u32, Vec2) -> bool,
+        throughput: Rgb,
         scratch: &mut PathScratch,
     ) -> Rgb {
         let whole = stretch(origin, direction, length);
@@ -187,7 +189,7 @@ impl Integrator<'_> {
         let segment = Segment { origin, direction, length };
         let wanted = Wanted::Along(segment, (lost / extinction) as f32);
         let mut sum = Rgb::ZERO;
-        let PathScratch { picks, stats, .. } = scratch;
+        let PathScratch { picks, stats, by_group, .. } = scratch;
         self.picker.pick(&wanted, u_pick, salt, picks, |pick| {
             stats.light_picks += 1;
             let place = f64::from(another(Vec2::new(u_place, 0.0), salt, pick.light).x);
@@ -198,13 +200,15 @@ impl Integrator<'_> {
             let Some(Drawn { t, pdf }) = drawn else { return };
             let point = stretch.at(t).as_vec3();
             let u = another(Vec2::new(lu, lv), !salt, pick.light);
-            let Some(light) = self.incoming(pick.light, point, Vec3::ZERO, u) else { return };
+            let Some(incoming) = self.incoming(pick.light, point, Vec3::ZERO, u) else { return };
             stats.rays += 1;
-            let arriving = self.arriving(&Anchor::free(point), &light, accept);
-            let turned = f64::from(fog.phase(light.direction, direction));
-            let density = pick.probability * pdf * f64::from(light.pdf.unwrap_or(1.0));
+            let arriving = self.arriving(&Anchor::free(point), &incoming, accept);
+            let turned = f64::from(fog.phase(incoming.direction, direction));
+            let density = pick.probability * pdf * f64::from(incoming.pdf.unwrap_or(1.0));
             let weight = (turned / density) as f32;
-            sum += fog.scattering * fog.through(t) * arriving * light.radiance * weight;
+            let light = fog.scattering * fog.through(t) * arriving * incoming.radiance * weight;
+            self.count_in_group(pick.light, throughput * light, by_group);
+            sum += light;
         });
         sum
     }

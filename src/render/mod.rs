@@ -14,7 +14,10 @@
 //! | [`rays`] | what does a ray hit, and is a light visible? |
 //! | [`surface`] | what is there: normals, textures, material? |
 //! | [`bsdf`] | how does it reflect? |
-//! | [`buffers`] | what is kept of a frame? |
+//! | [`layers`], [`light_groups`], [`crop`] | what is kept of a frame, of which lights, of which part? |
+//! | `pixel`, `parts` | what do a pixel's samples come to? |
+//! | `motion`, `cryptomatte` | where does it move, and what is it? |
+//! | [`buffers`] | where is it all kept? |
 //! | [`exr`], [`beauty`], [`png`] | how does it get to the disk? |
 //! | [`frames`], [`frame_names`] | which frames, and under which names? |
 
@@ -22,18 +25,31 @@ pub mod beauty;
 pub mod bsdf;
 pub mod buffers;
 pub mod camera;
+pub mod crop;
+mod cryptomatte;
 pub mod delegate;
 pub mod direct;
 pub mod exr;
+mod exr_header;
 pub mod fog;
 pub mod frame_names;
 pub mod frames;
+pub mod layers;
+pub mod light_groups;
+mod motion;
+mod parts;
 pub mod path;
 pub mod picker;
+mod pixel;
+mod plan;
 pub mod png;
 pub mod rays;
 pub mod settings;
 pub mod surface;
 
-pub use delegate::{Progress, RenderDelegate, RenderedFrame};
+pub use crop::{CropError, Window};
+pub use delegate::{FrameStats, Progress, RenderDelegate, RenderError, RenderedFrame};
+pub use layers::Aov;
+pub use light_groups::{LightGroupError, LightGroupRule};
+pub use plan::PlanError;
 pub use settings::{LightStrategy, RenderSettings, SplitBy};

@@ -10,6 +10,7 @@ use super::bsdf::Reflection;
 use super::camera::{CameraRay, CameraRays};
 use super::direct::power_heuristic;
 use super::fog::Fog;
+use super::light_groups::LightGroups;
 use super::picker::{LightPicker, PickScratch, Wanted};
 use super::rays::{Anchor, Hit, HitSurface, Seen, SeenLight, Sender, Tracer};
 use super::settings::RenderSettings;
@@ -42,21 +43,34 @@ pub struct Integrator<'a> {
     pub camera: CameraRays,
     /// What fills the space, if anything does.
     pub fog: Option<Fog>,
+    /// Which light group each light is in, if that is asked for.
+    pub groups: Option<&'a LightGroups>,
 }
 
-/// What one path saw.
+/// What one path saw. Its light by group is in [`PathScratch::by_group`].
 #[derive(Clone, Copy, Debug, Default)]
 pub struct PathSample {
     /// Radiance towards the eye, nits.
     pub radiance: Rgb,
-    /// Whether the eye's ray hit anything.
-    pub covered: bool,
+    /// That by how often it was scattered: never, once, more often.
+    pub by_scatterings: [Rgb; 3],
+    /// The eye's ray, unit, world space.
+    pub direction: Vec3,
+    /// What the eye's ray hit.
+    pub hit: Option<Hit>,
     /// Distance along the view axis to the first hit, metres.
     pub depth_m: f32,
     /// World-space shading normal of the first hit.
     pub normal: Vec3,
     /// Share of white light that the first hit reflects.
     pub albedo: Rgb,
+}
+
+impl PathSample {
+    fn add(&mut self, scatterings: u32, light: Rgb) {
+        self.radiance += light;
+        self.by_scatterings[scatterings.min(2) as usize] += light;
+    }
 }
 
 /// What tracing cost.
@@ -103,6 +117,8 @@ pub struct Vertex {
 pub struct PathScratch {
     pub(super) picks: PickScratch,
     lights: Vec<SeenLight>,
+    /// Light of the last path towards the eye by light group, nits; empty unless that is asked for.
+    pub by_group: Vec<Rgb>,
     /// What it cost so far.
     pub stats: TraceStats,
 }
@@ -123,7 +139,9 @@ impl Integrator<'_> {
         let CameraRay { mut origin, mut direction, mut reach_m } =
             self.camera.ray(x, y, Vec2::new(px, py), Vec2::new(lx, ly));
         let accept = self.cutouts(hash(seed, index));
-        let mut seen = PathSample::default();
+        let mut seen = PathSample { direction, ..Default::default() };
+        scratch.by_group.clear();
+        scratch.by_group.resize(self.groups.map_or(0, |groups| groups.names().len()), Rgb::ZERO);
         let mut throughput = Rgb::ONE;
         let mut before: Option<Origin> = None;
         for bounce in 0..=self.settings.depth {
@@ -138,28 +156,29 @@ impl Integrator<'_> {
                 if bounce < self.settings.depth {
                     let (numbers, salt) = (sampler.next_4d(), hash(seed, !bounce));
                     let stretch = (origin, direction, length);
-                    let light = self.scattered(fog, stretch, (numbers, salt), &accept, scratch);
-                    seen.radiance += throughput * light;
+                    let numbers = (numbers, salt);
+                    let light = self.scattered(fog, stretch, numbers, &accept, throughput, scratch);
+                    seen.add(bounce + 1, throughput * light);
                 }
             }
             for SeenLight { hit, .. } in &lights {
                 let arriving = throughput * self.through_fog(origin, direction, hit.t);
-                seen.radiance += arriving * self.emitted(hit, direction, &before, scratch);
+                seen.add(bounce, self.emitted(hit, direction, &before, arriving, scratch));
             }
             scratch.lights = lights;
             let length = hit.as_ref().map_or(f32::INFINITY, |hit| hit.t);
             throughput *= self.through_fog(origin, direction, length);
             let Some(hit) = hit else {
                 if !in_shade {
-                    let light = self.emitted_at_infinity(direction, &before, scratch);
-                    seen.radiance += throughput * light;
+                    let light = self.emitted_at_infinity(direction, &before, throughput, scratch);
+                    seen.add(bounce, throughput * light);
                 }
                 break;
             };
             let wo = -direction;
             let vertex = self.vertex(&hit, wo);
             if bounce == 0 {
-                seen.covered = true;
+                seen.hit = Some(hit);
                 seen.depth_m = self.camera.depth_m(hit.anchor.position);
                 seen.normal = vertex.as_ref().map_or(hit.anchor.normal, |v| v.receiver.normal);
                 seen.albedo = vertex.as_ref().map_or(Rgb::ZERO, |v| {
@@ -172,8 +191,8 @@ impl Integrator<'_> {
             let wanted = self.wanted(&vertex, &mut sampler);
             let [pick, lu, lv, roulette] = sampler.next_4d();
             let numbers = (pick, Vec2::new(lu, lv), hash(seed, bounce));
-            let direct = self.direct(&vertex, &wanted, numbers, &accept, scratch);
-            seen.radiance += throughput * direct;
+            let direct = self.direct(&vertex, &wanted, numbers, &accept, throughput, scratch);
+            seen.add(bounce + 1, throughput * direct);
 
             let [lobe, bu, bv, _] = sampler.next_4d();
             let Some(next) = vertex.reflection.sample(lobe, Vec2::new(bu, bv)) else { break };
@@ -257,12 +276,26 @@ impl Integrator<'_> {
         self.fog.as_ref().map_or(Rgb::ONE, through)
     }
 
-    /// Light emitted at a ray's hit, weighted against picking that light.
+    /// The part of a light's contribution that goes to its group.
+    #[inline]
+    pub(super) fn count_in_group(&self, light: Picked, contribution: Rgb, by_group: &mut [Rgb]) {
+        if let Some(groups) = self.groups {
+            let group = match light {
+                Picked::Emitter(emitter) => groups.of_emitter(self.emitters.emitters, emitter),
+                Picked::Beside(row) => groups.of_infinite(&self.infinite[row as usize]),
+            };
+            by_group[group] += contribution;
+        }
+    }
+
+    /// Light emitted at a ray's hit towards the eye, weighted against picking that light. `throughput`
+    /// is the share of it that gets there.
     fn emitted(
         &self,
         hit: &Hit,
         direction: Vec3,
         before: &Option<Origin>,
+        throughput: Rgb,
         scratch: &mut PathScratch,
     ) -> Rgb {
         let emitter = match hit.surface {
@@ -287,18 +320,22 @@ impl Integrator<'_> {
         if radiance == Rgb::ZERO {
             return Rgb::ZERO;
         }
-        let Some(before) = before else { return radiance };
-        radiance
-            * self.weight_of_hit(before, Picked::Emitter(emitter), scratch, || {
-                self.emitters.pdf(&at, before.point)
-            })
+        let light = Picked::Emitter(emitter);
+        let weight = before.as_ref().map_or(1.0, |before| {
+            let pdf = || self.emitters.pdf(&at, before.point);
+            self.weight_of_hit(before, light, scratch, pdf)
+        });
+        let arriving = throughput * (radiance * weight);
+        self.count_in_group(light, arriving, &mut scratch.by_group);
+        arriving
     }
 
-    /// Light of the infinite lights along a ray, weighted likewise.
+    /// Light of the infinite lights along a ray, weighted likewise; before `throughput`.
     fn emitted_at_infinity(
         &self,
         direction: Vec3,
         before: &Option<Origin>,
+        throughput: Rgb,
         scratch: &mut PathScratch,
     ) -> Rgb {
         let mut sum = Rgb::ZERO;
@@ -309,12 +346,13 @@ impl Integrator<'_> {
             if radiance == Rgb::ZERO {
                 continue;
             }
+            let picked = Picked::Beside(row as u32);
             let weight = before.as_ref().map_or(1.0, |before| {
-                self.weight_of_hit(before, Picked::Beside(row as u32), scratch, || {
-                    light.pdf(before.normal, direction)
-                })
+                self.weight_of_hit(before, picked, scratch, || light.pdf(before.normal, direction))
             });
-            sum += radiance * weight;
+            let light = radiance * weight;
+            self.count_in_group(picked, throughput * light, &mut scratch.by_group);
+            sum += light;
         }
         sum
     }

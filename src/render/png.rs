@@ -2,7 +2,7 @@
 //!
 //! Not a measurement: the EXR beside it is. Beauty is scaled by `2^exposure`, bent by Narkowicz's
 //! fit of the ACES film curve (2016; 1 becomes 0.80, whites roll off) and encoded as sRGB, over
-//! black. Scenes in photometric units are thousands of nits bright, so the exposure can be chosen
+//! black. A part of a frame gives a preview of that part alone. Scenes in photometric units are thousands of nits bright, so the exposure can be chosen
 //! from the picture: [`exposure_for`].
 
 use super::beauty::Beauty;
@@ -40,9 +40,8 @@ pub fn write_png(path: &Path, picture: &Beauty, exposure_stops: f32, text: &str)
 pub fn read_text(path: &Path) -> Option<String> {
     let bytes = read_regular(path, MOST_BYTES).ok()?;
     let mut reader = Decoder::new(Cursor::new(bytes)).read_info().ok()?;
-    let mut row_ = Vec::new();
-    row_.resize(reader.output_line_size(reader.info().width)?, 0);
-    while reader.read_row(&mut row_).ok()?.is_some() {}
+    let mut row = vec![0; reader.output_line_size(reader.info().width)?];
+    while reader.read_row(&mut row).ok()?.is_some() {}
     reader.finish().ok()?;
     let texts = &reader.info().uncompressed_latin1_text;
     texts.iter().find(|text| text.keyword == KEYWORD).map(|text| text.text.clone())

@@ -1,5 +1,8 @@
 //! Render settings: the knobs of a render.
 
+use super::crop::{CropError, Window};
+use super::layers::Aov;
+use super::light_groups::LightGroupRule;
 use crate::light_tree::{SplitTest, Splitting};
 use serde::{Deserialize, Serialize};
 
@@ -65,6 +68,14 @@ pub struct RenderSettings {
     /// Multiple importance sampling: picked lights are weighed against lights that reflected rays hit.
     /// Without it, lights are found by picking alone.
     pub mis: bool,
+    /// What is written of a frame. The beauty always is.
+    pub aovs: Vec<Aov>,
+    /// The beauty is stored in 32 bits instead of 16.
+    pub float_beauty: bool,
+    /// Which lights are in which light group, before what the scene says. For [`Aov::LightGroups`].
+    pub light_groups: Vec<LightGroupRule>,
+    /// The part of the picture that is rendered; all of it if `None`. Its pixels are the whole one's.
+    pub crop: Option<Window>,
 }
 
 impl Default for RenderSettings {
@@ -80,11 +91,24 @@ impl Default for RenderSettings {
             max_lights: 64,
             split_by: SplitBy::default(),
             mis: true,
+            aovs: Aov::DEFAULT.to_vec(),
+            float_beauty: false,
+            light_groups: Vec::new(),
+            crop: None,
         }
     }
 }
 
 impl RenderSettings {
+    /// The part of the picture that is rendered.
+    ///
+    /// # Errors
+    /// If the crop is not a part of the picture.
+    pub fn window(&self) -> Result<Window, CropError> {
+        let whole = Window::whole(self.width, self.height);
+        self.crop.unwrap_or(whole).inside(self.width, self.height)
+    }
+
     /// How the tree is to be split.
     pub fn splitting(&self) -> Splitting {
         Splitting {

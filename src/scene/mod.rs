@@ -12,6 +12,7 @@
 //! | [`materials`](Scene::materials), [`textures`](Scene::textures) | how a surface reflects and emits |
 //! | [`instances`](Scene::instances) | a mesh put at a node: what a ray can hit |
 //! | [`lights`](Scene::lights) | lights that are not meshes: points, spots, spheres, suns, domes |
+//! | [`light_groups`](Scene::light_groups) | a name for the lights at a node and below |
 //! | [`medium`](Scene::medium) | the fog that fills it, or a box of it; one or none |
 //! | [`cameras`](Scene::cameras) | a view from a node |
 //! | [`notes`](Scene::notes) | what the file holds and the scene does not |
@@ -52,6 +53,7 @@ pub use timeline::Timeline;
 pub use visibility::Visibility;
 
 use glam::DVec3;
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 /// Everything ingest found, by index. See the [module page](self).
@@ -73,6 +75,8 @@ pub struct Scene {
     pub instances: Vec<Instance>,
     /// Lights that are not meshes.
     pub lights: Vec<Light>,
+    /// Light groups by node: of the lights at it, and of those below that have none of their own.
+    pub light_groups: BTreeMap<u32, String>,
     /// The fog in it, if there is any.
     pub medium: Option<Medium>,
     /// Cameras, in the file's order.

@@ -402,3 +402,44 @@ def test_temperature_and_its_switch_over_time(gltf):
     rows = np.array(scene.lux("/L")["values"]["rgb"])
     assert rows[1] == pytest.approx([1, 1, 1])
     assert rows[2] == pytest.approx([1.6799, 0.8660, 0.3256], rel=2e-4)
+
+
+GROUPS = {
+    "candelabra:lightGroup": "string",
+    "primvars:arnold:aov": "string",
+    "karma:light:lpetag": "string",
+    "inputs:karma:light:lpetag": "string",
+    "ri:light:lightGroup": "string",
+    "inputs:ri:light:lightGroup": "string",
+    "primvars:ri:attributes:identifier:lpegroup": "string",
+    "cycles:lightgroup": "string",
+    "moonray:label": "token",
+}
+
+
+@pytest.mark.parametrize("name", GROUPS)
+def test_a_light_group_is_carried_whoever_names_it(export, name):
+    result = export(f'def RectLight "L" {{ {GROUPS[name]} {name} = "key" }}')
+    assert Gltf(result.path).lux("/L")["group"] == "key"
+    assert name in result.noted() and not result.warned()
+
+
+def test_an_array_of_one_name_is_the_name(gltf):
+    assert gltf('def RectLight "L" { string[] primvars:arnold:aov = ["rim"] }').lux("/L")["group"] == "rim"
+
+
+@pytest.mark.parametrize("none", ["", "default"])
+def test_the_default_group_is_none(gltf, none):
+    assert "group" not in gltf(f'def RectLight "L" {{ string primvars:arnold:aov = "{none}" }}').lux("/L")
+
+
+def test_groups_that_contradict_are_warned_of(export):
+    result = export(
+        """def SphereLight "L" {
+            string karma:light:lpetag = "fill"
+            string ri:light:lightGroup = "rim"
+            int moonray:label = 3
+        }"""
+    )
+    assert Gltf(result.path).lux("/L")["group"] == "fill"
+    assert {"ri:light:lightGroup overruled", "moonray:label of a wrong type"} <= result.warned("lights")

@@ -1,8 +1,8 @@
 //! Orthographic cameras, exposure and clipping planes, in pictures.
 
 use crate::stage::{Stage, at, direct, facing, glow, lambert};
+use crate::statistics::{Pixel, pixels};
 use candelabra::render::RenderSettings;
-use candelabra::render::buffers::Pixel;
 use candelabra::scene::{Camera, LightKind};
 use glam::{DVec3, Vec3};
 
@@ -25,7 +25,7 @@ fn without_perspective_a_size_is_the_same_at_every_distance() {
         let settings = RenderSettings { width: 10, depth: 0, ..direct(5, 1024) };
         let buffers = stage.render(&settings);
         // Pixels of 0.8 m; the card is from 0 to 1 m to the right, from 0 to 0.5 m up.
-        for (i, pixel) in buffers.pixels().iter().enumerate() {
+        for (i, pixel) in pixels(&buffers).iter().enumerate() {
             let (x, y) = (i % 10, i / 10);
             let share = |low: f64, high: f64, from: f64, to: f64| {
                 ((high.min(to) - low.max(from)) / (high - low)).max(0.0)
@@ -61,7 +61,7 @@ fn clipped(clip_m: [f32; 2], orthographic: bool) -> Vec<Pixel> {
         false => stage.scene.cameras[0].clone(),
     };
     stage.scene.cameras[0] = Camera { clip_m, ..camera };
-    stage.render(&direct(9, 64)).pixels().to_vec()
+    pixels(&stage.render(&direct(9, 64)))
 }
 
 #[test]
@@ -91,7 +91,7 @@ fn exposure_scales_radiance_and_nothing_else() {
     let render = |exposure_scale: f32| {
         let mut stage = table();
         stage.scene.cameras[0].exposure_scale = exposure_scale;
-        stage.render(&direct(9, 64)).pixels().to_vec()
+        pixels(&stage.render(&direct(9, 64)))
     };
     let plain = render(1.0);
     assert!(plain.iter().any(|pixel| pixel.variance.x > 0.0));

@@ -32,7 +32,7 @@ pub fn assert_irradiance(what: &str, stage: &Stage, expected_lux: f64) {
 #[track_caller]
 pub fn assert_dark(what: &str, stage: &Stage) {
     let buffers = stage.render(&direct(4, 256));
-    assert!(buffers.pixels().iter().all(|pixel| pixel.beauty == Vec3::ZERO), "{what} is not dark");
+    assert!(buffers.beauty().all(|beauty| beauty == Vec3::ZERO), "{what} is not dark");
 }
 
 /// Irradiance from a polygon of radiance 1 that a receiver at the origin sees above its horizon

@@ -4,7 +4,7 @@ use crate::moving::{FRAMES, carousel};
 use crate::rooms;
 use crate::stage::{Set, Stage, direct, tree_bytes};
 use candelabra::render::RenderSettings;
-use candelabra::render::exr::{ExrOptions, write_exr};
+use candelabra::render::exr::write_exr;
 use candelabra::scene::{LightKind, Scene};
 
 /// Every kind of light, textures, cut-outs, and lights that move.
@@ -23,17 +23,9 @@ fn bytes(scene: &Scene, seed: u32) -> (Vec<u8>, Vec<u8>) {
     let set = Set::of(scene, &FRAMES);
     let settings = RenderSettings { depth: 3, seed, ..direct(40, 4) };
     let buffers = set.render(&settings, 13);
-    let all = ExrOptions {
-        float_beauty: true,
-        depth: true,
-        normal: true,
-        albedo: true,
-        variance: true,
-        sample_count: true,
-    };
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("picture.exr");
-    write_exr(&path, &buffers, &all, "{}").unwrap();
+    write_exr(&path, &buffers, "{}").unwrap();
     (tree_bytes(scene, &FRAMES).as_ref().to_vec(), std::fs::read(path).unwrap())
 }
 

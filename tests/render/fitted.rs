@@ -165,8 +165,8 @@ fn flat_and_thin_scenes_are_seen() {
         stage.quad([2.0, 1.0], glow(Vec3::ONE), facing(DVec3::ZERO, normal));
         let buffers = picture(&mut stage.scene);
         // It shines to one side only, and that is the one to be seen.
-        let lit = buffers.pixels().iter().filter(|pixel| pixel.beauty.x > 0.5).count();
-        assert!(lit > buffers.pixels().len() / 20, "{normal}: {lit} pixels are lit");
+        let lit = buffers.beauty().filter(|beauty| beauty.x > 0.5).count();
+        assert!(lit > buffers.beauty().count() / 20, "{normal}: {lit} pixels are lit");
     }
     let mut line = Stage::default();
     lamp(&mut line, DVec3::ZERO);
@@ -186,9 +186,9 @@ fn a_point_and_nothing_at_all_have_a_view() {
     flat.mesh(nothing, lambert(Vec3::ONE), at(DVec3::ZERO));
     for stage in [&mut Stage::default(), &mut point, &mut sky, &mut flat] {
         let buffers = picture(&mut stage.scene);
-        assert!(buffers.pixels().iter().all(|pixel| pixel.beauty.is_finite()));
+        assert!(buffers.beauty().all(|beauty| beauty.is_finite()));
     }
-    assert!(picture(&mut sky.scene).pixels().iter().all(|pixel| pixel.beauty == Vec3::ONE));
+    assert!(picture(&mut sky.scene).beauty().all(|beauty| beauty == Vec3::ONE));
 }
 
 /// A small picture of direct light of the first frame.
@@ -232,8 +232,8 @@ fn rooms_are_seen_where_they_are_lit() {
             }
             let mut stage = room(&walls, facets);
             let buffers = picture(&mut stage.scene);
-            let lit = buffers.pixels().iter().filter(|pixel| pixel.beauty.x > 0.01).count();
-            let share = lit as f64 / buffers.pixels().len() as f64;
+            let lit = buffers.beauty().filter(|beauty| beauty.x > 0.01).count();
+            let share = lit as f64 / buffers.beauty().count() as f64;
             assert!(share > 0.3, "wall {open} is open, {facets} facets: {share} of it is lit");
         }
     }

@@ -4,6 +4,7 @@ use crate::closed_forms::{assert_irradiance, of_sphere, receiver};
 use crate::moving::carousel;
 use crate::rooms;
 use crate::stage::{Set, Stage, aimed, at, by, direct, facing, glow, lambert};
+use crate::statistics::pixels;
 use crate::strategies::{Way, disagreement, render};
 use candelabra::light_tree::{Picked, Receiver, Scratch, Splitting, TreeKind};
 use candelabra::pipeline::{NoLightThere, force_lights};
@@ -173,9 +174,9 @@ fn a_forced_sun_is_sampled_beside_the_pick() {
         let camera = stage.scene.cameras[0].clone();
         let delegate = RenderDelegate::new(set.scene, &set.emitters, &set.tree, camera, settings);
         let seen = delegate.render(1, &()).unwrap();
-        let covered: f32 = seen.buffers.pixels().iter().map(|pixel| pixel.alpha * 16.0).sum();
+        let covered: f32 = pixels(&seen.buffers).iter().map(|pixel| pixel.alpha * 16.0).sum();
         assert!(covered > 200.0);
-        assert_eq!(seen.stats.light_picks, picks * covered as u64, "forced: {forced}");
+        assert_eq!(seen.stats.trace.light_picks, picks * covered as u64, "forced: {forced}");
     }
 }
 
@@ -237,7 +238,7 @@ fn forcing_a_strong_light_behind_a_wall_quiets_the_picture() {
         assert_eq!(shared.count(), usize::from(forced));
         let own = settings(forced.into());
         let buffers = set.render(&RenderSettings { samples: 4096, split: 0.0, ..own }, 1);
-        let noise: f64 = buffers.pixels().iter().map(|p| p.variance.as_dvec3().y).sum();
+        let noise: f64 = pixels(&buffers).iter().map(|p| p.variance.as_dvec3().y).sum();
         seen.push((noise, buffers));
     }
     assert_eq!(disagreement(&seen[0].1, &seen[1].1), None);

@@ -18,8 +18,9 @@ fn columns(distance: f64) -> Vec<f64> {
     let camera = stage.look(DVec3::ZERO, -DVec3::Z, 2.0 * EDGE.atan() as f32);
     (camera.lens_radius_m, camera.focus_distance_m) = (RADIUS as f32, FOCUS as f32);
     let buffers = stage.render(&RenderSettings { depth: 0, ..direct(COLUMNS, 64) });
+    let beauty: Vec<Vec3> = buffers.beauty().collect();
     let column = |x: u32| {
-        let rows = (0..COLUMNS).map(|y| buffers.pixels()[(y * COLUMNS + x) as usize].beauty.x);
+        let rows = (0..COLUMNS).map(|y| beauty[(y * COLUMNS + x) as usize].x);
         rows.map(f64::from).sum::<f64>() / f64::from(COLUMNS)
     };
     (0..COLUMNS).map(column).collect()

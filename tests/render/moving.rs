@@ -5,7 +5,7 @@ use crate::stage::{Set, Stage, aimed, at, by, facing, glow, picture};
 use crate::statistics::Estimate;
 use crate::strategies::{SIZE, disagreement, render};
 use candelabra::light_tree::{FrameTree, Receiver};
-use candelabra::render::{LightStrategy, RenderDelegate, RenderSettings};
+use candelabra::render::{LightStrategy, RenderDelegate, RenderError, RenderSettings};
 use candelabra::scene::{
     Channel, Interpolation, Keys, Light, LightKind, Material, Scene, Shaping, Trs,
 };
@@ -199,7 +199,7 @@ fn a_frame_that_the_tree_lacks_is_named() {
     let delegate = RenderDelegate::new(set.scene, &set.emitters, &set.tree, camera, settings);
     for frame in [0, 2, 26, i32::MIN] {
         match delegate.render(frame, &()) {
-            Err(error) => {
+            Err(RenderError::NoSuchFrame(error)) => {
                 assert_eq!((error.frame, error.first, error.last), (frame, 1, 25));
                 assert!(error.to_string().contains("--frames"), "{error}");
             }

@@ -1,9 +1,9 @@
 //! Lights with a range are dark beyond it, and the tree knows.
 
 use crate::stage::{Stage, at, direct, facing, lambert};
+use crate::statistics::{Pixel, pixels};
 use candelabra::emitter::EmitterPlace;
 use candelabra::light_tree::{Receiver, Segment};
-use candelabra::render::buffers::Pixel;
 use candelabra::scene::LightKind;
 use glam::{DVec3, IVec3, Vec3};
 
@@ -91,5 +91,5 @@ fn between_the_ranges_of_all_lights_it_is_black() {
     stage.look(middle + DVec3::Y, middle, 0.5);
     let buffers = stage.render(&direct(4, 16));
     let black = |p: &Pixel| p.alpha == 1.0 && p.beauty == Vec3::ZERO;
-    assert!(buffers.pixels().iter().all(black));
+    assert!(pixels(&buffers).iter().all(black));
 }

@@ -42,9 +42,9 @@ fn render(mut scene: Scene) -> f32 {
     let camera = pipeline::look(&mut scene, &View::default(), ASPECT).unwrap().camera;
     let frame = pipeline::frames_of(&scene)[0];
     let buffers = Set::of(&scene, &[frame]).seen_by(camera, &settings(), frame);
-    let beauty = || buffers.pixels().iter().map(|pixel| pixel.beauty);
+    let beauty = || buffers.beauty();
     assert!(beauty().all(|color| color.is_finite() && color.min_element() >= 0.0));
-    beauty().map(|color| color.element_sum()).sum::<f32>() / (3 * buffers.pixels().len()) as f32
+    beauty().map(|color| color.element_sum()).sum::<f32>() / (3 * beauty().count()) as f32
 }
 
 fn is_scene(file: &Path) -> bool {
@@ -100,6 +100,6 @@ fn seventeen_million_emitters() {
     let delegate = RenderDelegate::new(&scene, &emitters, &tree, camera, settings());
     tell("geometry prepared");
     let buffers = delegate.render(1, &()).unwrap().buffers;
-    assert!(buffers.pixels().iter().all(|pixel| pixel.beauty.is_finite()));
+    assert!(buffers.beauty().all(|beauty| beauty.is_finite()));
     tell("rendered");
 }

@@ -3,7 +3,7 @@
 
 use crate::shared;
 use crate::stage::Set;
-use crate::statistics::blocks;
+use crate::statistics::{blocks, pixels};
 use candelabra::math::color::luminance;
 use candelabra::pipeline;
 use candelabra::render::RenderSettings;
@@ -44,9 +44,10 @@ fn load(folder: &Path, scene: &str) -> Scene {
 /// few samples find of one may be in the next pixel too.
 fn compared(set: &Set, settings: &RenderSettings, reference: &[f64]) -> Vec<bool> {
     let emitters = set.render(&RenderSettings { depth: 0, ..settings.clone() }, 1);
+    let beauty: Vec<Vec3> = emitters.beauty().collect();
     let (width, height) = (settings.width, settings.height);
     let floor = 1e-6 * reference.iter().sum::<f64>() / reference.len() as f64;
-    let shines = |x: u32, y: u32| emitters.pixels()[(y * width + x) as usize].beauty != Vec3::ZERO;
+    let shines = |x: u32, y: u32| beauty[(y * width + x) as usize] != Vec3::ZERO;
     let is_compared = |pixel: u32| {
         let (x, y) = (pixel % width, pixel / width);
         let rows = y.saturating_sub(1)..=(y + 1).min(height - 1);
@@ -62,7 +63,7 @@ fn compared(set: &Set, settings: &RenderSettings, reference: &[f64]) -> Vec<bool
 /// strongly correlated; the variance is that of fully correlated ones.
 fn luminances(buffers: &RenderBuffers) -> Vec<(f64, f64)> {
     let deviation = |v: Vec3| f64::from(luminance(Vec3::from_array(v.to_array().map(f32::sqrt))));
-    let pixels = buffers.pixels().iter();
+    let pixels = pixels(buffers).into_iter();
     pixels.map(|p| (f64::from(luminance(p.beauty)), deviation(p.variance).powi(2))).collect()
 }
 

@@ -1,6 +1,7 @@
 //! No seams in the noise: where the decision to split changes, variance does not jump.
 
 use crate::stage::{Stage, at, direct, facing, lambert};
+use crate::statistics::{Pixel, pixels};
 use crate::strategies::Way;
 use candelabra::render::SplitBy;
 use candelabra::scene::LightKind;
@@ -23,11 +24,10 @@ fn profile(way: Way) -> Vec<f64> {
     let mut settings = way.settings(true, &direct(PIXELS, 8192));
     settings.height = 1;
     let buffers = stage.set().render(&settings, 1);
-    let of_one = |pixel: &candelabra::render::buffers::Pixel| {
-        f64::from(pixel.variance.y * 8192.0) / f64::from(pixel.beauty.y).powi(2)
-    };
+    let of_one =
+        |pixel: &Pixel| f64::from(pixel.variance.y * 8192.0) / f64::from(pixel.beauty.y).powi(2);
     // From beside the cluster on: below it, each light is a hill of its own.
-    buffers.pixels()[24..].iter().map(of_one).collect()
+    pixels(&buffers)[24..].iter().map(of_one).collect()
 }
 
 /// The largest factor between neighbours.

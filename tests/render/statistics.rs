@@ -1,8 +1,33 @@
 //! What a noisy picture says, and how sure it is of it.
 
-use candelabra::render::buffers::{Pixel, RenderBuffers};
-use glam::DVec3;
+use candelabra::render::buffers::RenderBuffers;
+use glam::{DVec3, Vec3};
 use std::fmt;
+
+/// The layers that are written unless others are asked for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pixel {
+    pub beauty: Vec3,
+    pub alpha: f32,
+    pub depth_m: f32,
+    pub variance: Vec3,
+}
+
+/// All pixels of a picture, row after row.
+pub fn pixels(buffers: &RenderBuffers) -> Vec<Pixel> {
+    let plane = |name: &str| {
+        let values = buffers.channel(name).unwrap_or_else(|| panic!("there is no {name}"));
+        values.collect::<Vec<f32>>()
+    };
+    let [alpha, depth, x, y, z] = ["A", "Z", "variance.R", "variance.G", "variance.B"].map(plane);
+    let pixel = |(i, beauty): (usize, Vec3)| Pixel {
+        beauty,
+        alpha: alpha[i],
+        depth_m: depth[i],
+        variance: Vec3::new(x[i], y[i], z[i]),
+    };
+    buffers.beauty().enumerate().map(pixel).collect()
+}
 
 /// A mean with the standard error that the picture's own variance buffer gives it. Sobol samples
 /// are better than independent ones, so the error is an upper bound, often a generous one.
@@ -26,15 +51,15 @@ impl Estimate {
 
     /// Of the whole picture.
     pub fn of_picture(buffers: &RenderBuffers) -> Estimate {
-        Estimate::of(buffers.pixels())
+        Estimate::of(&pixels(buffers))
     }
 
     /// Of the mean difference between two pictures, from the spread of the pixels' differences. Each
     /// pixel has samples of its own, so this is what the error really is.
     pub fn of_difference(a: &RenderBuffers, b: &RenderBuffers) -> Estimate {
-        let pairs = || a.pixels().iter().zip(b.pixels());
-        let differences = || pairs().map(|(a, b)| a.beauty.as_dvec3() - b.beauty.as_dvec3());
-        let count = a.pixels().len() as f64;
+        let pairs = || a.beauty().zip(b.beauty());
+        let differences = || pairs().map(|(a, b)| a.as_dvec3() - b.as_dvec3());
+        let count = a.beauty().count() as f64;
         let mean = differences().sum::<DVec3>() / count;
         let spread = differences().map(|d| (d - mean) * (d - mean)).sum::<DVec3>();
         let variance = spread / (count * (count - 1.0));
@@ -74,9 +99,9 @@ fn root(squares: DVec3) -> DVec3 {
 /// sequence of its own, are so many measurements of the same thing: their spread is the error.
 #[track_caller]
 pub fn assert_even(what: &str, buffers: &RenderBuffers, expected: f64, precision: f64) {
-    let count = buffers.pixels().len() as f64;
+    let count = buffers.beauty().count() as f64;
     for channel in 0..3 {
-        let values = || buffers.pixels().iter().map(|pixel| f64::from(pixel.beauty[channel]));
+        let values = || buffers.beauty().map(|beauty| f64::from(beauty[channel]));
         let mean = values().sum::<f64>() / count;
         let spread = values().map(|value| (value - mean).powi(2)).sum::<f64>() / (count - 1.0);
         let error = (spread / count).sqrt();

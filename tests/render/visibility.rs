@@ -1,7 +1,7 @@
 //! Lights that some rays do not meet: they light what they light, and every strategy agrees on it.
 
 use crate::stage::{Set, Stage, at, by, direct, facing, glow, lambert, scaled};
-use crate::statistics::Estimate;
+use crate::statistics::{Estimate, pixels};
 use crate::strategies::{SIZE, disagreement, render};
 use candelabra::render::LightStrategy;
 use candelabra::scene::{LightKind, Material, Scene, Visibility};
@@ -74,7 +74,7 @@ fn an_unlit_lamp_blocks_neither_sun_nor_view() {
     let settings = direct(24, 16);
     let beauty = |stage: Stage| {
         let buffers = stage.render(&settings);
-        buffers.pixels().iter().map(|p| (p.beauty, p.depth_m.to_bits())).collect::<Vec<_>>()
+        pixels(&buffers).iter().map(|p| (p.beauty, p.depth_m.to_bits())).collect::<Vec<_>>()
     };
     let free = beauty(under_the_sun(|_| ()));
     for camera in [false, true] {

@@ -2,10 +2,9 @@
 
 use crate::display::Form;
 use candelabra::pipeline::{Preview, RenderJob, Strict, View, option};
-use candelabra::render::exr::ExrOptions;
 use candelabra::render::frame_names::FrameNames;
 use candelabra::render::frames::Frames;
-use candelabra::render::{LightStrategy, RenderSettings, SplitBy};
+use candelabra::render::{Aov, LightGroupRule, LightStrategy, RenderSettings, SplitBy, Window};
 use candelabra::scene::Medium;
 use clap::{Parser, ValueEnum};
 use std::path::PathBuf;
@@ -75,6 +74,18 @@ pub struct Arguments {
     /// Beauty in 32-bit floats instead of 16
     #[arg(long)]
     pub float: bool,
+    /// Layers to write beside the beauty; may be given again, or as a list with commas
+    #[arg(long, value_enum, value_name = "LAYER", value_delimiter = ',', default_values_t = Aov::DEFAULT)]
+    pub aov: Vec<Aov>,
+    /// Put the lights at prim paths that match, and below them, into a light group, as
+    /// key=/World/Lamps/key*; may be given again, the first that matches counts. Light groups are then
+    /// written, whether or not --aov names them
+    #[arg(long, value_name = "NAME=PATTERN")]
+    pub light_group: Vec<LightGroupRule>,
+    /// Render only the pixels from column X0 to column X1 and from row Y0 to row Y1, without X1 and Y1;
+    /// (0, 0) is the top left. The rest of the picture is not in the file
+    #[arg(long, num_args = 4, value_names = ["X0", "Y0", "X1", "Y1"])]
+    pub crop: Option<Vec<u32>>,
     /// Skip frames that are there, whole, and rendered from the same scene and settings
     #[arg(long)]
     pub resume: bool,
@@ -150,18 +161,20 @@ impl Arguments {
             fog: self.fog.clone(),
             force_lights: self.force_light.clone(),
             preview: self.png.then_some(Preview { exposure: self.exposure }),
-            layers: ExrOptions {
-                float_beauty: self.float,
-                depth: true,
-                normal: true,
-                albedo: true,
-                variance: true,
-                sample_count: true,
-            },
             resume: self.resume,
             verify: !self.no_verify,
             strict: self.strict.clone(),
         }
+    }
+
+    /// The layers, in one order and each once: the same picture has the same settings.
+    fn aovs(&self) -> Vec<Aov> {
+        let of_groups = Some(Aov::LightGroups).filter(|_| !self.light_group.is_empty());
+        let mut aovs: Vec<Aov> =
+            self.aov.iter().copied().chain(of_groups).chain([Aov::Beauty]).collect();
+        aovs.sort_unstable();
+        aovs.dedup();
+        aovs
     }
 
     fn settings(&self) -> RenderSettings {
@@ -183,6 +196,13 @@ impl Arguments {
                 Test::Variance => SplitBy::Variance,
                 Test::SolidAngle => SplitBy::SolidAngle,
             },
+            aovs: self.aovs(),
+            float_beauty: self.float,
+            light_groups: self.light_group.clone(),
+            crop: self.crop.as_deref().and_then(|edges| match *edges {
+                [x0, y0, x1, y1] => Some(Window { x0, y0, x1, y1 }),
+                _ => None,
+            }),
             ..RenderSettings::default()
         }
     }

@@ -137,6 +137,11 @@ impl Walk<'_> {
         }
         fog::of_node(output, &row.extras, node, object)?;
         let lux = UsdLux::of(&row.extras, object)?;
+        if let Some(group) = lux.as_ref().and_then(|lux| lux.group.as_ref()) {
+            let bytes = size_of::<(u32, String)>() + group.len();
+            output.budget.take(bytes as u64, || object.to_string())?;
+            output.scene.light_groups.insert(node, group.clone());
+        }
         let mut values = lights::values(lux.as_ref(), object)?;
         let light = lights::of_node(self.source, output, number, lux.as_ref(), node, object)?
             .map(|light| Light { values: values.take(), ..light });

@@ -1,8 +1,8 @@
 //! Why a shot cannot be rendered at all.
 
 use crate::ingest::IngestError;
-use crate::light_tree::NoSuchFrame;
 use crate::pipeline::{NoLightThere, StrictError, TreeError, ViewError};
+use crate::render::PlanError;
 use crate::render::frame_names::FrameNamesError;
 use std::io;
 use std::path::PathBuf;
@@ -46,16 +46,16 @@ pub enum RenderError {
     /// The program cannot read itself, so pictures cannot be told from those of another one.
     #[error("the program's own file cannot be read: {0}; start it from where it can be")]
     Program(io::Error),
-    /// A frame to be measured is not in the tree.
+    /// The settings do not fit the scene.
     #[error(transparent)]
-    Frame(#[from] NoSuchFrame),
+    Plan(#[from] PlanError),
 }
 
 impl RenderError {
     /// Whether the options contradict each other although each is valid by itself.
     pub fn is_usage(&self) -> bool {
         match self {
-            RenderError::Names(_) => true,
+            RenderError::Names(_) | RenderError::Plan(PlanError::Crop(_)) => true,
             RenderError::View(error) => error.is_usage(),
             _ => false,
         }

@@ -4,11 +4,10 @@
 //! chosen from a small picture of the scene's first frame, whatever frames are asked for.
 
 use super::shot::Shot;
-use crate::light_tree::NoSuchFrame;
 use crate::pipeline::frames_of;
 use crate::render::beauty::Beauty;
 use crate::render::png::exposure_for;
-use crate::render::{RenderDelegate, RenderSettings};
+use crate::render::{RenderDelegate, RenderError, RenderSettings};
 
 /// Rows of the small picture.
 const HEIGHT: u32 = 54;
@@ -22,13 +21,16 @@ const SAMPLES: u32 = 16;
 pub(super) fn of_shot<D: AsRef<[u8]> + Sync>(
     shot: &Shot,
     delegate: &mut RenderDelegate<D>,
-) -> Result<f32, NoSuchFrame> {
+) -> Result<f32, RenderError> {
     let RenderSettings { width, height, .. } = shot.settings;
     let columns = u64::from(width) * u64::from(HEIGHT) / u64::from(height);
     delegate.set_settings(RenderSettings {
         width: columns.clamp(1, 4 * u64::from(HEIGHT)) as u32,
         height: HEIGHT,
         samples: SAMPLES,
+        aovs: Vec::new(),
+        light_groups: Vec::new(),
+        crop: None,
         ..shot.settings.clone()
     });
     let frame = frames_of(&shot.scene)[0];

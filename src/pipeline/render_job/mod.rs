@@ -29,7 +29,6 @@ use super::{
 use crate::emitter::Emitters;
 use crate::light_tree::LightTree;
 use crate::render::RenderSettings;
-use crate::render::exr::ExrOptions;
 use crate::render::frame_names::FrameNames;
 use crate::render::frames::Frames;
 use crate::scene::Medium;
@@ -64,8 +63,6 @@ pub struct RenderJob {
     pub force_lights: Vec<String>,
     /// Previews beside the pictures, if any.
     pub preview: Option<Preview>,
-    /// What is written.
-    pub layers: ExrOptions,
     /// Keep pictures that are there, whole, and of the same.
     pub resume: bool,
     /// Prove that the tree file is sound before it is used.

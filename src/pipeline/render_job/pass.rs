@@ -8,10 +8,10 @@ use super::writer::{Finished, Writer, write_preview};
 use super::{RenderError, RenderJob, exposure};
 
 use crate::emitter::Emitters;
-use crate::light_tree::{LightTree, NoSuchFrame};
+use crate::light_tree::LightTree;
 use crate::pipeline::{Event, PreviewStamp, Stamp, Stamper, Watch};
 use crate::render::beauty::Beauty;
-use crate::render::{Progress, RenderDelegate};
+use crate::render::{self, Progress, RenderDelegate};
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
 /// One pass over the frames of a shot.
@@ -28,6 +28,8 @@ pub(super) struct Pass<'a> {
     delegate: Option<RenderDelegate<'a, &'a [u8]>>,
     /// Stops of all previews of the shot, once they are needed.
     exposure: Option<f32>,
+    /// Rows of a frame's window.
+    height: u64,
     rows: Rows<'a>,
 }
 
@@ -47,9 +49,11 @@ impl<'a> Pass<'a> {
         watch: &'a dyn Watch,
         clock: &'a mut Clock,
     ) -> Result<Pass<'a>, RenderError> {
-        let rest = (&job.fog, &job.force_lights, &job.layers, job.verify);
+        let rest = (&job.fog, &job.force_lights, job.verify);
         let stamper = Stamper::new(&shot.scene, &shot.camera, &shot.settings, rest);
-        let rows = u64::from(shot.settings.height) * shot.frames.as_slice().len() as u64;
+        shot.settings.check(&shot.scene, emitters)?;
+        let height = shot.settings.window()?.height().into();
+        let rows = height * shot.frames.as_slice().len() as u64;
         Ok(Pass {
             job,
             shot,
@@ -61,6 +65,7 @@ impl<'a> Pass<'a> {
             clock,
             delegate: None,
             exposure: None,
+            height,
             rows: Rows { watch, all: rows, done: AtomicU64::new(0), frame: 0 },
         })
     }
@@ -86,7 +91,7 @@ impl<'a> Pass<'a> {
                 }
             }
             self.rows.done.store(before, Relaxed);
-            self.rows.rows_done(self.shot.settings.height.into());
+            self.rows.rows_done(self.height);
         }
         counts
     }
@@ -103,7 +108,11 @@ impl<'a> Pass<'a> {
         let stamp = self.stamp(frame);
         self.prepared();
         let Pass { delegate: Some(delegate), rows, .. } = self else { return Ok(Outcome::Stopped) };
-        let rendered = delegate.render(frame, &*rows).map_err(|error| in_words(&error))?;
+        let rendered = match delegate.render(frame, &*rows) {
+            Ok(rendered) => rendered,
+            Err(render::RenderError::Stopped) => return Ok(Outcome::Stopped),
+            Err(error) => return Err(error.to_string()),
+        };
         let seconds = self.clock.lap(|seconds| &mut seconds.rendering);
         writer.hand_over(Finished { rendered, stamp, seconds, exposure });
         self.clock.lap(|seconds| &mut seconds.waiting);
@@ -111,7 +120,7 @@ impl<'a> Pass<'a> {
     }
 
     /// Stops of previews, if there are any.
-    fn exposure(&mut self) -> Result<Option<f32>, NoSuchFrame> {
+    fn exposure(&mut self) -> Result<Option<f32>, render::RenderError> {
         let Some(preview) = self.job.preview else { return Ok(None) };
         if let Some(stops) = preview.exposure.or(self.exposure) {
             return Ok(Some(stops));
@@ -173,5 +182,9 @@ impl Progress for Rows<'_> {
         let done = self.done.fetch_add(rows, Relaxed) + rows;
         let done = done as f64 / self.all.max(1) as f64;
         self.watch.tell(Event::Progress { done, frame: Some(self.frame) });
+    }
+
+    fn is_stopped(&self) -> bool {
+        self.watch.is_stopped()
     }
 }

@@ -90,9 +90,17 @@ impl Writing<'_> {
 
     fn write(&self, frame: &Finished) -> io::Result<()> {
         let Finished { rendered, stamp, seconds, exposure } = frame;
+        if let Some((x, y)) = rendered.stats.first_non_finite {
+            let text = format!(
+                "frame {}: {} samples were infinite or no number and were left out, the first in pixel \
+                 {x},{y}",
+                stamp.frame, rendered.stats.non_finite
+            );
+            self.watch.tell(Event::Note { text });
+        }
         let output = self.outputs.picture(stamp.frame);
         let metadata = serde_json::to_string(stamp)?;
-        match write_exr(&output, &rendered.buffers, &self.job.layers, &metadata) {
+        match write_exr(&output, &rendered.buffers, &metadata) {
             Ok(bytes) => self.outputs.note_length(bytes),
             Err(error) => {
                 // As long as it could be: the next frame is not rendered for nothing.
@@ -101,14 +109,14 @@ impl Writing<'_> {
             }
         }
         if let (Some(stops), Some(preview)) = (exposure, self.outputs.preview(stamp.frame)) {
-            let beauty = Beauty::of(&rendered.buffers, self.job.layers.float_beauty);
+            let beauty = Beauty::of(&rendered.buffers, self.job.settings.float_beauty);
             write_preview(&preview, &beauty, *stops, &self.job.preview_stamp(stamp))?;
         }
         self.watch.tell(Event::FrameDone {
             frame: stamp.frame,
             seconds: *seconds,
-            rays: rendered.stats.rays,
-            light_picks: rendered.stats.light_picks,
+            rays: rendered.stats.trace.rays,
+            light_picks: rendered.stats.trace.light_picks,
             output,
         });
         Ok(())

@@ -48,6 +48,7 @@ pub(in crate::ingest::gltf) struct UsdLux {
     pub force: bool,
     #[serde(default)]
     pub visibility: UsdVisibility,
+    pub group: Option<String>,
     pub values: Option<UsdValues>,
 }
 

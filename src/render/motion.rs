@@ -1,0 +1,83 @@
+//! Motion vectors: how far what a pixel sees moves on the picture, to the next frame and from the last.
+//!
+//! In pixels, to the right and up, as Nuke's layers `forward` and `backward` have it: `forward` leads to
+//! the place in the next frame, `backward` to the place in the last one. Camera and rigid motion at the
+//! first hit count; reflections do not. Both ends are projected through the middle of the lens, so what
+//! stands still has exactly zero. What is infinitely far turns with the camera. Beyond the shot's keys
+//! nothing moves.
+
+use super::camera::CameraRays;
+use super::path::PathSample;
+use super::rays::HitSurface;
+use crate::scene::{Camera, Pose, Scene};
+use glam::{Affine3A, DAffine3, DVec2, DVec3, Vec3};
+
+/// A frame and its neighbours.
+pub struct Motion<'a> {
+    scene: &'a Scene,
+    pose: &'a Pose,
+    camera: CameraRays,
+    /// The next frame and the last.
+    neighbours: [(Pose, CameraRays); 2],
+}
+
+impl<'a> Motion<'a> {
+    /// Poses the scene in the frames after and before `frame`, whose pose is given.
+    pub fn new(
+        scene: &'a Scene,
+        pose: &'a Pose,
+        camera: &Camera,
+        frame: i32,
+        [width, height]: [u32; 2],
+    ) -> Motion<'a> {
+        let rays = |pose: &Pose| CameraRays::new(camera, pose, width, height);
+        let neighbours = [1.0, -1.0].map(|step| {
+            let pose = scene.pose_at(scene.timeline.seconds_at(f64::from(frame) + step));
+            let rays = rays(&pose);
+            (pose, rays)
+        });
+        Motion { scene, pose, camera: rays(pose), neighbours }
+    }
+
+    /// `forward` and `backward` of what a path has hit first. Zero where a neighbour does not have it in
+    /// front of the camera.
+    pub fn of(&self, sample: &PathSample) -> [DVec2; 2] {
+        let Some(hit) = &sample.hit else {
+            let at = |camera: &CameraRays| camera.project_direction(sample.direction);
+            let here = at(&self.camera);
+            return self.neighbours.each_ref().map(|(_, camera)| moved(here, at(camera)));
+        };
+        let node = match hit.surface {
+            HitSurface::Triangle { instance, .. } => self.scene.instances[instance as usize].node,
+            HitSurface::Sphere { light } => self.scene.lights[light as usize].node,
+        };
+        let point = hit.anchor.position;
+        let here = self.camera.project(point.as_dvec3());
+        let own = self.pose.world(node);
+        self.neighbours.each_ref().map(|(pose, camera)| {
+            let there = carried(point, own, pose.world(node));
+            moved(here, camera.project(there))
+        })
+    }
+}
+
+/// Where a point that is fixed to a node is in another pose.
+fn carried(point: Vec3, from: Affine3A, to: Affine3A) -> DVec3 {
+    let point = point.as_dvec3();
+    if from == to {
+        return point;
+    }
+    let double = |world: Affine3A| {
+        let translation = Vec3::from(world.translation).as_dvec3();
+        DAffine3 { matrix3: world.matrix3.as_dmat3(), translation }
+    };
+    let there = (double(to) * double(from).inverse()).transform_point3(point);
+    // A node that is flat has no inverse.
+    if there.is_finite() { there } else { point }
+}
+
+fn moved(here: Option<DVec2>, there: Option<DVec2>) -> DVec2 {
+    let (Some(here), Some(there)) = (here, there) else { return DVec2::ZERO };
+    let motion = there - here;
+    if motion.is_finite() { motion } else { DVec2::ZERO }
+}
