@@ -8,6 +8,7 @@
 mod agreement;
 mod build;
 mod content;
+mod fingerprint;
 mod fit;
 mod forced;
 mod frames;
@@ -15,8 +16,10 @@ mod fresh;
 mod look;
 pub mod option;
 mod rig;
+mod shot_trees;
 mod strict;
 mod survey;
+mod surveyor;
 mod textures;
 mod view;
 mod watch;
@@ -31,8 +34,9 @@ pub use fresh::{
     open_base, open_tree,
 };
 pub use rig::carry_camera;
+pub use shot_trees::{ShotTrees, TreeFile};
 pub use strict::{Strict, StrictError};
-pub use survey::{Group, PlacedLight, SharedBounds, Survey, survey};
+pub use survey::{Group, PlacedLight, SharedBounds, Survey, SurveyedFrame, survey};
 pub use textures::collect_emitters;
 pub use view::{ASPECT, Look, View, ViewError, look};
 pub use watch::{Event, Watch};

@@ -7,7 +7,7 @@ use anyhow::{Context, Result, bail};
 use candelabra::emitter::Emitters;
 use candelabra::light_tree::{ALGORITHM_VERSION, LightTree};
 use candelabra::page::Plain;
-use candelabra::pipeline::{self, OpenedTree};
+use candelabra::pipeline::{self, OpenedTree, ShotTrees, TreeError, TreeFile};
 use candelabra::render::exr::{ExrOptions, read_metadata, write_exr};
 use candelabra::render::frames::Frames;
 use candelabra::render::png::{exposure_for, write_png};
@@ -57,11 +57,23 @@ pub fn render(arguments: &Arguments) -> Result<usize> {
     refuse_to_overwrite(arguments, &scene, &frames)?;
     match &arguments.tree {
         Some(path) => {
-            let verify = !arguments.no_verify;
-            let tree = pipeline::open_tree(path, verify)?;
+            let tree = pipeline::open_tree(path, false)?;
             let emitters = collect(&scene, Some(&tree));
-            let forced = &arguments.force_light;
-            pipeline::check_fresh(&tree, path, &scene, &emitters, forced, verify)?;
+            let file = TreeFile {
+                tree: tree.by_reference(),
+                path,
+                forced: &arguments.force_light,
+                verify: !arguments.no_verify,
+            };
+            let mut trees = ShotTrees::of_file(&scene, &emitters, file)?;
+            for &frame in frames.as_slice() {
+                match trees.for_frame(frame) {
+                    // The delegate says so of each frame.
+                    Ok(_) | Err(TreeError::NoSuchFrame { .. }) => {}
+                    Err(error) => return Err(error.into()),
+                }
+            }
+            drop(trees);
             render_frames(arguments, &scene, &emitters, &tree, camera, &frames)
         }
         None => {
