@@ -225,8 +225,7 @@ mod tests {
         buffers.set(3, 0, &[1e6, f32::INFINITY, 2049.0, 0.1]);
         write_exr(&path, &buffers, "{}").unwrap();
         let at_3 = channels(&path).into_iter().map(|(name, values)| (name, values[3]));
-        let expected =
-            [("A", f32::from(f16::from_f32(0.1))), ("B", 2048.0), ("G", 65504.0), ("R", 65504.0)];
+        let expected = [("A", half(0.1).to_f32()), ("B", 2048.0), ("G", 65504.0), ("R", 65504.0)];
         assert!(at_3.eq(expected.map(|(name, value)| (name.to_string(), value))));
     }
 

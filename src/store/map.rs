@@ -2,7 +2,7 @@
 #![allow(unsafe_code)]
 
 use super::open_regular;
-use memmap2::{Advice, Mmap};
+use memmap2::Mmap;
 use std::io;
 use std::path::Path;
 
@@ -22,8 +22,5 @@ pub fn map(path: &Path) -> io::Result<Mmap> {
     // SAFETY: the mapping is undefined if another process truncates or overwrites the file while
     // we read. No tool of ours does (see above). All types viewed in the bytes are `Pod`, so that
     // foreign writes could at worst give wrong numbers, which sampling survives by construction.
-    let map = unsafe { Mmap::map(&file) }?;
-    // Trees are small and read whole: fetch ahead rather than fault page by page.
-    let _ = map.advise(Advice::WillNeed);
-    Ok(map)
+    unsafe { Mmap::map(&file) }
 }

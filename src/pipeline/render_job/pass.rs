@@ -11,7 +11,7 @@ use crate::emitter::Emitters;
 use crate::light_tree::LightTree;
 use crate::pipeline::{Event, PreviewStamp, Stamp, Stamper, Watch};
 use crate::render::beauty::Beauty;
-use crate::render::{self, Progress, RenderDelegate};
+use crate::render::{self, PlanError, Progress, RenderDelegate};
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
 /// One pass over the frames of a shot.
@@ -52,7 +52,7 @@ impl<'a> Pass<'a> {
         let rest = (&job.fog, &job.force_lights, job.verify);
         let stamper = Stamper::new(&shot.scene, &shot.camera, &shot.settings, rest);
         shot.settings.check(&shot.scene, emitters)?;
-        let height = shot.settings.window()?.height().into();
+        let height = u64::from(shot.settings.window().map_err(PlanError::from)?.height());
         let rows = height * shot.frames.as_slice().len() as u64;
         Ok(Pass {
             job,
