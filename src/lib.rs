@@ -44,8 +44,7 @@
 //!
 //! // The same type over bytes just built and over a mapped file (`pipeline::open_tree`).
 //! let tree = LightTree::open(bytes)?;
-//! let leaves = tree.leaf_table();
-//! let frame = tree.at_frame(1001, &leaves)?;
+//! let frame = tree.at_frame(1001)?;
 //! let receiver = Receiver { point: Vec3::ZERO, normal: Vec3::Y };
 //! if let Some(pick) = frame.sample(&receiver, 0.25) {
 //!     assert!(pick.probability > 0.0);

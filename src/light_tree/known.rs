@@ -1,5 +1,6 @@
 //! What has been found out about the trees of an open file, so that it is found out once.
 
+use super::leaves::LeafTable;
 use std::sync::OnceLock;
 
 /// What is known of a file.
@@ -9,6 +10,8 @@ pub(super) struct Known {
     whole: OnceLock<()>,
     /// Set once the rows of all trees are.
     pub rows: OnceLock<()>,
+    /// Where the leaves are that frames share.
+    pub leaves: OnceLock<LeafTable>,
     trees: OnceLock<Box<[OfTree]>>,
 }
 

@@ -56,7 +56,6 @@ pub use builder::ALGORITHM_VERSION;
 pub use cut::{Picked, Scratch};
 pub use glossy::{Glossy, Lobes};
 pub use group::{Group, WIDTH};
-pub use leaves::LeafTable;
 pub use node::{Link, Node};
 pub use records::{
     FrameRow, InstanceRow, LightLook, LightRow, MeanRow, Numbering, TextureRow, TreeKind, TreeRow,

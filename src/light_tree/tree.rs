@@ -86,6 +86,11 @@ impl<D: AsRef<[u8]>> LightTree<D> {
         self.container.into_bytes()
     }
 
+    /// What holds the bytes of the file.
+    pub fn data(&self) -> &D {
+        self.container.data()
+    }
+
     /// The fingerprint of the content the trees were built from.
     pub fn fingerprint(&self) -> [u8; 32] {
         self.container.fingerprint()

@@ -7,14 +7,14 @@ use super::{Survey, frames_of, survey};
 use crate::emitter::{Emitters, LightOverflow};
 use crate::light_tree::{ALGORITHM_VERSION, LightSummary, LightTree, NoSuchFrame};
 use crate::scene::Scene;
-use crate::store::{self, Mmap, StoreError};
+use crate::store::{self, MappedFile, StoreError};
 use std::collections::BTreeMap;
 use std::fmt;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
 /// A tree over a mapped file.
-pub type OpenedTree = LightTree<Mmap>;
+pub type OpenedTree = LightTree<MappedFile>;
 
 /// Why a tree file cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -64,6 +64,15 @@ pub enum TreeError {
         /// The frames that it has.
         cause: NoSuchFrame,
     },
+    /// Somebody wrote to the file while it was in use.
+    #[error(
+        "{}: was written to while it was in use, so what it says is not what was checked; publish a tree under another name and rename it over the old one, then render again with --resume",
+        path.display()
+    )]
+    Overwritten {
+        /// The file.
+        path: PathBuf,
+    },
     /// It was built by another version of the algorithm.
     #[error("{}: it was built by another version of the algorithm; build it again", path.display())]
     OtherAlgorithm {
@@ -91,7 +100,7 @@ pub fn is_tree_file(path: &Path) -> bool {
 /// # Errors
 /// If the file cannot be read or breaks a rule.
 pub fn open_tree(path: &Path, verify: bool) -> Result<OpenedTree, TreeError> {
-    let map = store::map(path).map_err(|cause| TreeError::Io { path: path.into(), cause })?;
+    let map = MappedFile::open(path).map_err(|cause| TreeError::Io { path: path.into(), cause })?;
     let broken = |cause| TreeError::Broken { path: path.into(), cause };
     let tree = LightTree::open(map).map_err(broken)?;
     if verify {

@@ -17,8 +17,8 @@ mod look;
 pub mod option;
 mod render_job;
 mod rig;
-mod stamp;
 mod shot_trees;
+mod stamp;
 mod strict;
 mod survey;
 mod surveyor;
@@ -39,8 +39,8 @@ pub use render_job::{
     FrameCounts, Preview, RenderError, RenderJob, RenderReport, SceneCounts, Seconds,
 };
 pub use rig::carry_camera;
-pub use stamp::{PreviewStamp, Stamp, Stamper};
 pub use shot_trees::{ShotTrees, TreeFile};
+pub use stamp::{PreviewStamp, Stamp, Stamper};
 pub use strict::{Strict, StrictError};
 pub use survey::{Group, PlacedLight, SharedBounds, Survey, SurveyedFrame, survey};
 pub use textures::collect_emitters;

@@ -170,11 +170,10 @@ impl<'a> ShotTrees<'a> {
         Ok(())
     }
 
-    fn agreement<'s>(
-        &'s self,
-        frames: &'s [SurveyedFrame],
-    ) -> Agreement<'s, &'a [u8]> {
-        let Source::File { file, .. } = &self.source else { unreachable!("only files are compared") };
+    fn agreement<'s>(&'s self, frames: &'s [SurveyedFrame]) -> Agreement<'s, &'a [u8]> {
+        let Source::File { file, .. } = &self.source else {
+            unreachable!("only files are compared")
+        };
         let Surveyor { shared, lasting, still, .. } = &self.surveyor;
         let changing = frames.iter().map(|frame| &*frame.group).collect();
         Agreement { tree: &file.tree, shared, lasting: *lasting, still, changing }
@@ -200,7 +199,10 @@ impl<'a> ShotTrees<'a> {
         let tree = LightTree::open(bytes).expect("what was just built can be opened");
         if let Some(earlier) = earlier {
             let stills = tree.still_tree().zip(earlier.still_tree());
-            tree.know_digests(earlier, (0..self.surveyor.lasting as u32).map(|row| (row, row)).chain(stills));
+            tree.know_digests(
+                earlier,
+                (0..self.surveyor.lasting as u32).map(|row| (row, row)).chain(stills),
+            );
         }
         *last = Some(BuiltFrame { fingerprint, number, tree });
         self.surveyor.forget_still();

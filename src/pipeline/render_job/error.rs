@@ -63,7 +63,12 @@ impl RenderError {
 
     /// Whether the tree file itself is at fault; not one that is absent.
     pub fn is_bad_tree(&self) -> bool {
-        use TreeError::{Broken, Contradicts, Stale};
-        matches!(self, RenderError::Tree(Broken { .. } | Stale { .. } | Contradicts { .. }))
+        use TreeError::{Broken, Contradicts, Overwritten, Stale};
+        matches!(
+            self,
+            RenderError::Tree(
+                Broken { .. } | Stale { .. } | Contradicts { .. } | Overwritten { .. }
+            )
+        )
     }
 }

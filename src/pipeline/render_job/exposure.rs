@@ -4,7 +4,7 @@
 //! chosen from a small picture of the scene's first frame, whatever frames are asked for.
 
 use super::shot::Shot;
-use crate::pipeline::frames_of;
+use crate::light_tree::LightTree;
 use crate::render::beauty::Beauty;
 use crate::render::png::exposure_for;
 use crate::render::{RenderDelegate, RenderError, RenderSettings};
@@ -14,13 +14,15 @@ const HEIGHT: u32 = 54;
 /// Samples of each of its pixels.
 const SAMPLES: u32 = 16;
 
-/// Stops that bring the middle of the scene's first frame to middle grey.
+/// Stops that bring the middle of a frame to middle grey.
 ///
 /// # Errors
-/// If the tree lacks that frame.
-pub(super) fn of_shot<D: AsRef<[u8]> + Sync>(
+/// If the tree lacks the frame.
+pub(super) fn of_frame(
     shot: &Shot,
-    delegate: &mut RenderDelegate<D>,
+    delegate: &mut RenderDelegate,
+    tree: &LightTree<&[u8]>,
+    frame: i32,
 ) -> Result<f32, RenderError> {
     let RenderSettings { width, height, .. } = shot.settings;
     let columns = u64::from(width) * u64::from(HEIGHT) / u64::from(height);
@@ -33,8 +35,7 @@ pub(super) fn of_shot<D: AsRef<[u8]> + Sync>(
         crop: None,
         ..shot.settings.clone()
     });
-    let frame = frames_of(&shot.scene)[0];
-    let rendered = delegate.render(frame, &());
+    let rendered = delegate.render(tree, frame, &());
     delegate.set_settings(shot.settings.clone());
     Ok(exposure_for(&Beauty::of(&rendered?.buffers, true)))
 }

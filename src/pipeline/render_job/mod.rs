@@ -23,21 +23,19 @@ pub use error::RenderError;
 pub use report::{FrameCounts, RenderReport, SceneCounts, Seconds};
 
 use super::{
-    Event, OpenedTree, PreviewStamp, Stamp, Strict, TreeError, View, Watch, build_tree,
-    check_fresh, collect_emitters, open_tree, survey,
+    Event, OpenedTree, PreviewStamp, ShotTrees, Stamp, Strict, TreeError, TreeFile, View, Watch,
+    collect_emitters, open_tree,
 };
 use crate::emitter::Emitters;
-use crate::light_tree::LightTree;
 use crate::render::RenderSettings;
 use crate::render::frame_names::FrameNames;
 use crate::render::frames::Frames;
-use crate::scene::Medium;
-use crate::store::AlignedBytes;
+use crate::scene::{Medium, Scene};
 use clock::Clock;
 use outputs::Outputs;
 use pass::Pass;
 use shot::Shot;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use writer::{Writer, Writing};
 
 /// A shot to be rendered.
@@ -102,74 +100,67 @@ impl RenderJob {
         clock.lap(|seconds| &mut seconds.scene);
 
         tell_stage(watch, "looking at the light tree");
-        let (emitters, trees) = self.trees(&shot, watch)?;
-        let tree = trees.by_reference();
+        let file = match &self.tree {
+            Some(path) => Some((open_tree(path, false)?, path.as_path())),
+            None => None,
+        };
+        let file = file.as_ref().map(|(tree, path)| (tree, *path));
+        let emitters = self.emitters(&shot.scene, file.map(|(tree, _)| tree), watch);
+        let trees = (self.trees(&shot.scene, &emitters, file)?, file);
         clock.lap(|seconds| &mut seconds.trees);
 
-        let writing = Writing { outputs: &outputs, job: self, watch };
-        let (frames, writing) = std::thread::scope(|scope| {
+        let writing = Writing { job: self, outputs: &outputs, watch };
+        let (frames, written) = std::thread::scope(|scope| {
             let writer = Writer::start(scope, writing);
-            let source = (&emitters, &tree);
-            let pass = Pass::new(self, &shot, source, &outputs, watch, &mut clock);
-            let frames = pass.map(|mut pass| pass.render_all(&writer));
-            let written = writer.finish();
-            let mut frames = frames?;
-            frames.done += written.frames.done;
-            frames.failed += written.frames.failed;
-            Ok::<_, RenderError>((frames, written.seconds))
-        })?;
+            let pass = Pass::new(self, &shot, &emitters, trees, &outputs, watch, &mut clock);
+            let frames = pass.and_then(|mut pass| pass.render_all(&writer));
+            (frames, writer.finish())
+        });
         clock.lap(|seconds| &mut seconds.waiting);
-        let seconds = Seconds { writing, ..clock.finish() };
-        let missing = frames.asked - frames.done - frames.up_to_date - frames.failed;
-        Ok(RenderReport { frames, seconds, stopped: missing > 0, ..RenderReport::default() })
+        let mut frames = frames?;
+        frames.done += written.frames.done;
+        frames.failed += written.frames.failed;
+        let left = frames.asked - frames.done - frames.up_to_date - frames.failed;
+        Ok(RenderReport {
+            frames,
+            seconds: Seconds { writing: written.seconds, ..clock.finish() },
+            rays: written.trace.rays,
+            light_picks: written.trace.light_picks,
+            non_finite_samples: written.non_finite,
+            scene: SceneCounts {
+                lights: emitters.lights().len(),
+                emitters: emitters.len(),
+                triangles: shot.triangles(),
+                tree_file_bytes: file.map(|(tree, _)| tree.byte_length()),
+            },
+            stopped: left > 0,
+        })
+    }
+
+    /// What shines in the scene.
+    fn emitters(&self, scene: &Scene, tree: Option<&OpenedTree>, watch: &dyn Watch) -> Emitters {
+        let progress = |done: u64, all: u64| {
+            let percent = 100 * done / all.max(1);
+            tell_stage(watch, &format!("integrating textures, {percent} %"));
+        };
+        collect_emitters(scene, tree, &progress)
+    }
+
+    /// The trees: from the file, or built.
+    fn trees<'a>(
+        &'a self,
+        scene: &'a Scene,
+        emitters: &'a Emitters,
+        file: Option<(&'a OpenedTree, &'a Path)>,
+    ) -> Result<ShotTrees<'a>, TreeError> {
+        let Some((tree, path)) = file else { return ShotTrees::built(scene, emitters) };
+        let (tree, forced) = (tree.by_reference(), self.force_lights.as_slice());
+        ShotTrees::of_file(scene, emitters, TreeFile { tree, path, forced, verify: self.verify })
     }
 
     /// The stamp of the preview of a picture.
     fn preview_stamp(&self, picture: &Stamp) -> PreviewStamp {
         PreviewStamp::new(picture, self.preview.and_then(|preview| preview.exposure))
-    }
-
-    /// The emitters and the trees.
-    fn trees(&self, shot: &Shot, watch: &dyn Watch) -> Result<(Emitters, Trees), RenderError> {
-        let tree = match &self.tree {
-            Some(path) => Some((path, open_tree(path, self.verify)?)),
-            None => None,
-        };
-        let progress = |done: u64, all: u64| {
-            let done = done as f64 / all.max(1) as f64;
-            watch.tell(Event::Stage {
-                name: format!("integrating textures, {:.0} %", done * 100.0),
-            });
-        };
-        let scene = &shot.scene;
-        let emitters = collect_emitters(scene, tree.as_ref().map(|(_, tree)| tree), &progress);
-        let trees = match tree {
-            Some((path, tree)) => {
-                check_fresh(&tree, path, scene, &emitters, &self.force_lights, self.verify)?;
-                Trees::File(tree)
-            }
-            None => {
-                let mut ascending = shot.frames.as_slice().to_vec();
-                ascending.sort_unstable();
-                let survey = survey(scene, &emitters, &ascending).map_err(TreeError::from)?;
-                Trees::Memory(LightTree::open(build_tree(&survey))?)
-            }
-        };
-        Ok((emitters, trees))
-    }
-}
-
-enum Trees {
-    File(OpenedTree),
-    Memory(LightTree<AlignedBytes>),
-}
-
-impl Trees {
-    fn by_reference(&self) -> LightTree<&[u8]> {
-        match self {
-            Trees::File(tree) => tree.by_reference(),
-            Trees::Memory(tree) => tree.by_reference(),
-        }
     }
 }
 

@@ -6,12 +6,13 @@ use super::report::FrameCounts;
 use super::shot::Shot;
 use super::writer::{Finished, Writer, write_preview};
 use super::{RenderError, RenderJob, exposure};
-
 use crate::emitter::Emitters;
-use crate::light_tree::LightTree;
-use crate::pipeline::{Event, PreviewStamp, Stamp, Stamper, Watch};
+use crate::pipeline::{
+    Event, OpenedTree, PreviewStamp, ShotTrees, Stamp, Stamper, TreeError, Watch, frames_of,
+};
 use crate::render::beauty::Beauty;
 use crate::render::{self, PlanError, Progress, RenderDelegate};
+use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
 /// One pass over the frames of a shot.
@@ -19,13 +20,15 @@ pub(super) struct Pass<'a> {
     job: &'a RenderJob,
     shot: &'a Shot,
     emitters: &'a Emitters,
-    tree: &'a LightTree<&'a [u8]>,
+    trees: ShotTrees<'a>,
+    /// The file that the trees are taken from, if there is one, and its path.
+    file: Option<(&'a OpenedTree, &'a Path)>,
     outputs: &'a Outputs<'a>,
     stamper: Stamper,
     watch: &'a dyn Watch,
     clock: &'a mut Clock,
     /// Prepared when the first frame needs it: a shot that is done resumes at once.
-    delegate: Option<RenderDelegate<'a, &'a [u8]>>,
+    delegate: Option<RenderDelegate<'a>>,
     /// Stops of all previews of the shot, once they are needed.
     exposure: Option<f32>,
     /// Rows of a frame's window.
@@ -40,11 +43,41 @@ enum Outcome {
     Stopped,
 }
 
+/// Why there is no picture of a frame.
+enum Trouble {
+    /// The other frames may do.
+    OfFrame(String),
+    /// No other frame will do.
+    OfShot(RenderError),
+}
+
+impl From<std::io::Error> for Trouble {
+    fn from(error: std::io::Error) -> Trouble {
+        Trouble::OfFrame(error.to_string())
+    }
+}
+
+impl From<TreeError> for Trouble {
+    fn from(error: TreeError) -> Trouble {
+        match error {
+            TreeError::NoSuchFrame { .. } => Trouble::OfFrame(error.to_string()),
+            _ => Trouble::OfShot(error.into()),
+        }
+    }
+}
+
+impl From<render::RenderError> for Trouble {
+    fn from(error: render::RenderError) -> Trouble {
+        Trouble::OfFrame(error.to_string())
+    }
+}
+
 impl<'a> Pass<'a> {
     pub fn new(
         job: &'a RenderJob,
         shot: &'a Shot,
-        (emitters, tree): (&'a Emitters, &'a LightTree<&'a [u8]>),
+        emitters: &'a Emitters,
+        (trees, file): (ShotTrees<'a>, Option<(&'a OpenedTree, &'a Path)>),
         outputs: &'a Outputs<'a>,
         watch: &'a dyn Watch,
         clock: &'a mut Clock,
@@ -52,13 +85,14 @@ impl<'a> Pass<'a> {
         let rest = (&job.fog, &job.force_lights, job.verify);
         let stamper = Stamper::new(&shot.scene, &shot.camera, &shot.settings, rest);
         shot.settings.check(&shot.scene, emitters)?;
-        let height = u64::from(shot.settings.window().map_err(PlanError::from)?.height());
+        let height = shot.settings.window().map_err(PlanError::from)?.height().into();
         let rows = height * shot.frames.as_slice().len() as u64;
         Ok(Pass {
             job,
             shot,
             emitters,
-            tree,
+            trees,
+            file,
             outputs,
             stamper: stamper.map_err(RenderError::Program)?,
             watch,
@@ -71,7 +105,10 @@ impl<'a> Pass<'a> {
     }
 
     /// Renders all frames and hands them over. Counts those that never get that far.
-    pub fn render_all(&mut self, writer: &Writer) -> FrameCounts {
+    ///
+    /// # Errors
+    /// If the tree turns out to be useless. What was handed over before is sound.
+    pub fn render_all(&mut self, writer: &Writer) -> Result<FrameCounts, RenderError> {
         let frames = self.shot.frames.as_slice();
         let mut counts = FrameCounts { asked: frames.len(), ..FrameCounts::default() };
         for &frame in frames {
@@ -85,7 +122,8 @@ impl<'a> Pass<'a> {
                 Ok(Outcome::HandedOver) => {}
                 Ok(Outcome::UpToDate) => counts.up_to_date += 1,
                 Ok(Outcome::Stopped) => break,
-                Err(why) => {
+                Err(Trouble::OfShot(error)) => return Err(error),
+                Err(Trouble::OfFrame(why)) => {
                     counts.failed += 1;
                     self.watch.tell(Event::FrameFailed { frame, why });
                 }
@@ -93,79 +131,113 @@ impl<'a> Pass<'a> {
             self.rows.done.store(before, Relaxed);
             self.rows.rows_done(self.height);
         }
-        counts
+        Ok(counts)
     }
 
-    fn render(&mut self, frame: i32, writer: &Writer) -> Result<Outcome, String> {
-        let in_words = |error: &dyn std::fmt::Display| error.to_string();
-        if self.job.resume && self.is_up_to_date(frame).map_err(|error| in_words(&error))? {
+    fn render(&mut self, frame: i32, writer: &Writer) -> Result<Outcome, Trouble> {
+        if self.job.resume && self.is_up_to_date(frame)? {
             let output = self.outputs.picture(frame);
             self.watch.tell(Event::UpToDate { frame: Some(frame), output });
             return Ok(Outcome::UpToDate);
         }
-        self.outputs.check_frame(frame).map_err(|error| in_words(&error))?;
-        let exposure = self.exposure().map_err(|error| in_words(&error))?;
-        let stamp = self.stamp(frame);
-        self.prepared();
-        let Pass { delegate: Some(delegate), rows, .. } = self else { return Ok(Outcome::Stopped) };
-        let rendered = match delegate.render(frame, &*rows) {
-            Ok(rendered) => rendered,
+        self.outputs.check_frame(frame)?;
+        let exposure = self.exposure()?;
+        let stamp = self.stamp(frame)?;
+        self.prepare();
+        let Pass { delegate: Some(delegate), trees, rows, .. } = self else {
+            return Ok(Outcome::Stopped);
+        };
+        let tree = trees.for_frame(frame)?;
+        self.clock.lap(|seconds| &mut seconds.trees);
+        let rendered = match delegate.render(&tree, frame, &*rows) {
             Err(render::RenderError::Stopped) => return Ok(Outcome::Stopped),
-            Err(error) => return Err(error.to_string()),
+            rendered => rendered?,
         };
         let seconds = self.clock.lap(|seconds| &mut seconds.rendering);
+        self.check_file()?;
         writer.hand_over(Finished { rendered, stamp, seconds, exposure });
         self.clock.lap(|seconds| &mut seconds.waiting);
         Ok(Outcome::HandedOver)
     }
 
+    /// Makes sure that what was checked of the tree file is what was sampled.
+    fn check_file(&self) -> Result<(), TreeError> {
+        match self.file {
+            Some((tree, path)) if !tree.data().is_unchanged() => {
+                Err(TreeError::Overwritten { path: path.into() })
+            }
+            _ => Ok(()),
+        }
+    }
+
     /// Stops of previews, if there are any.
-    fn exposure(&mut self) -> Result<Option<f32>, render::RenderError> {
+    fn exposure(&mut self) -> Result<Option<f32>, Trouble> {
         let Some(preview) = self.job.preview else { return Ok(None) };
         if let Some(stops) = preview.exposure.or(self.exposure) {
             return Ok(Some(stops));
         }
-        let shot = self.shot;
-        let stops = exposure::of_shot(shot, self.prepared())?;
+        self.prepare();
+        let Pass { delegate: Some(delegate), trees, shot, emitters, .. } = self else {
+            return Ok(None);
+        };
+        let frame = frames_of(&shot.scene)[0];
+        let stops = match trees.for_frame(frame) {
+            // The file may be of other frames; the exposure is the same all the same.
+            Err(TreeError::NoSuchFrame { .. }) => {
+                let mut own = ShotTrees::built(&shot.scene, emitters)?;
+                exposure::of_frame(shot, delegate, &own.for_frame(frame)?, frame)?
+            }
+            tree => exposure::of_frame(shot, delegate, &tree?, frame)?,
+        };
         self.clock.lap(|seconds| &mut seconds.exposure);
         self.exposure = Some(stops);
         Ok(self.exposure)
     }
 
-    fn stamp(&self, frame: i32) -> Stamp {
-        self.stamper.stamp(frame, self.tree.fingerprint())
+    fn stamp(&mut self, frame: i32) -> Result<Stamp, Trouble> {
+        let tree = self.trees.for_frame(frame)?;
+        let digest = tree.digest_at(frame).map_err(render::RenderError::from)?;
+        let stamp = self.stamper.stamp(frame, digest);
+        self.clock.lap(|seconds| &mut seconds.trees);
+        Ok(stamp)
     }
 
     /// Whether a frame's picture is there, whole and of the same. Then a preview that is not is made again
     /// from it.
-    fn is_up_to_date(&mut self, frame: i32) -> std::io::Result<bool> {
+    fn is_up_to_date(&mut self, frame: i32) -> Result<bool, Trouble> {
         let picture = self.outputs.picture(frame);
         let earlier = Stamp::of_picture(&picture);
-        let is_same = earlier.filter(|stamp| stamp.fingerprint == self.stamper.fingerprint(frame));
-        let is_same = is_same.is_some_and(|stamp| stamp == self.stamp(frame));
-        if let (true, Some(preview)) = (is_same, self.outputs.preview(frame)) {
-            let wanted = self.job.preview_stamp(&self.stamp(frame));
-            if PreviewStamp::of_preview(&preview).as_ref() != Some(&wanted) {
-                let Some(stops) = self.exposure().map_err(std::io::Error::other)? else {
-                    return Ok(false);
-                };
-                write_preview(&preview, &Beauty::read(&picture)?, stops, &wanted)?;
-            }
+        self.clock.lap(|seconds| &mut seconds.resume);
+        let fingerprint = self.stamper.fingerprint(frame);
+        // The tree is looked at only if all else is the same.
+        let Some(earlier) = earlier.filter(|stamp| stamp.fingerprint == fingerprint) else {
+            return Ok(false);
+        };
+        let stamp = self.stamp(frame)?;
+        if earlier != stamp {
+            return Ok(false);
+        }
+        let Some(preview) = self.outputs.preview(frame) else { return Ok(true) };
+        let wanted = self.job.preview_stamp(&stamp);
+        if PreviewStamp::of_preview(&preview).as_ref() != Some(&wanted)
+            && let Some(stops) = self.exposure()?
+        {
+            write_preview(&preview, &Beauty::read(&picture)?, stops, &wanted)?;
         }
         self.clock.lap(|seconds| &mut seconds.resume);
-        Ok(is_same)
+        Ok(true)
     }
 
-    /// The delegate, with what rays hit prepared.
-    fn prepared(&mut self) -> &mut RenderDelegate<'a, &'a [u8]> {
-        let Pass { shot, emitters, tree, watch, clock, .. } = self;
-        self.delegate.get_or_insert_with(|| {
-            watch.tell(Event::Stage { name: "preparing rays".into() });
-            let (camera, settings) = (shot.camera.clone(), shot.settings.clone());
-            let delegate = RenderDelegate::new(&shot.scene, emitters, tree, camera, settings);
-            clock.lap(|seconds| &mut seconds.rays);
-            delegate
-        })
+    /// Prepares what rays hit, unless that is done.
+    fn prepare(&mut self) {
+        if self.delegate.is_some() {
+            return;
+        }
+        self.watch.tell(Event::Stage { name: "preparing rays".into() });
+        let Shot { scene, camera, settings, .. } = self.shot;
+        let (camera, settings) = (camera.clone(), settings.clone());
+        self.delegate = Some(RenderDelegate::new(scene, self.emitters, camera, settings));
+        self.clock.lap(|seconds| &mut seconds.rays);
     }
 }
 

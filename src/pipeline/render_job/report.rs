@@ -13,6 +13,8 @@ pub struct RenderReport {
     pub rays: u64,
     /// Lights picked.
     pub light_picks: u64,
+    /// Samples left out of their pixels because their radiance was infinite or no number.
+    pub non_finite_samples: u64,
     /// What was prepared.
     pub scene: SceneCounts,
     /// Whether the job was told to stop before all frames were done.
@@ -65,5 +67,5 @@ pub struct SceneCounts {
     /// Triangles of all instances.
     pub triangles: u64,
     /// Bytes of the tree file, if there is one.
-    pub tree_file_bytes: Option<u64>,
+    pub tree_file_bytes: Option<usize>,
 }

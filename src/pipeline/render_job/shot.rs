@@ -37,6 +37,12 @@ impl Shot {
         let settings = RenderSettings { width, height, ..job.settings.clone() };
         Ok(Shot { scene, camera, frames, settings })
     }
+
+    /// Triangles of all instances.
+    pub fn triangles(&self) -> u64 {
+        let meshes = self.scene.instances.iter().map(|instance| instance.mesh as usize);
+        meshes.map(|mesh| self.scene.meshes[mesh].triangles.len() as u64).sum()
+    }
 }
 
 /// The frames that were asked for, or the first. Tells what may not be what the user means.

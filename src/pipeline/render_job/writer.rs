@@ -7,6 +7,7 @@ use crate::pipeline::{Event, PreviewStamp, Stamp, Watch};
 use crate::render::RenderedFrame;
 use crate::render::beauty::Beauty;
 use crate::render::exr::write_exr;
+use crate::render::path::TraceStats;
 use crate::render::png::write_png;
 use std::io;
 use std::path::Path;
@@ -36,6 +37,8 @@ pub(super) struct Writing<'a> {
 pub(super) struct Written {
     pub frames: FrameCounts,
     pub seconds: f64,
+    pub trace: TraceStats,
+    pub non_finite: u64,
 }
 
 /// A thread that writes what it is handed. It takes one frame at a time, so that there are never more than
@@ -75,6 +78,9 @@ impl Writing<'_> {
         let mut written = Written::default();
         for frame in receiver {
             let started = Instant::now();
+            let stats = frame.rendered.stats;
+            written.trace = written.trace.plus(stats.trace);
+            written.non_finite += stats.non_finite;
             match self.write(&frame) {
                 Ok(()) => written.frames.done += 1,
                 Err(error) => {
