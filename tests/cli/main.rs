@@ -5,6 +5,7 @@ mod diff;
 mod disk;
 mod files;
 mod inspect;
+mod layers;
 mod lies;
 mod lights;
 mod names;

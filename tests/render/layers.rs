@@ -9,7 +9,7 @@ use candelabra::render::exr::write_exr;
 use candelabra::render::{
     Aov, FrameStats, LightStrategy, Progress, RenderDelegate, RenderError, RenderSettings, Window,
 };
-use candelabra::scene::{Channel, Interpolation, Keys, LightKind, Medium, Scene};
+use candelabra::scene::{Camera, Channel, Interpolation, Keys, LightKind, Medium, Scene, Trs};
 use clap::ValueEnum;
 use exr::meta::attribute::AttributeValue;
 use exr::prelude::{ReadChannels, ReadLayers, f16, read};
@@ -250,10 +250,8 @@ fn motion_is_where_things_were_and_will_be() {
     stage.quad([1.0, 4.0], lambert([0.5; 3]), at([1.0, 0.0, 0.0]));
     let path = [Vec3::new(-1.5, 0.0, 0.0), Vec3::new(-1.5, 2.4, 0.0)];
     stage.scene.nodes[quad as usize].channels = vec![Channel::Translation(linear(path))];
-    *stage.look([0.0, 0.0, 5.0], DVec3::ZERO, 1.0) = {
-        let node = stage.scene.cameras[0].node;
-        candelabra::scene::Camera::orthographic(node, 4.0)
-    };
+    let camera = stage.look([0.0, 0.0, 5.0], DVec3::ZERO, 1.0);
+    *camera = Camera::orthographic(camera.node, 4.0);
     let settings = RenderSettings { aovs: vec![Aov::Motion], ..direct(32, 4) };
     let set = Set::of(&stage.scene, &[1, FRAME, 25]);
     let at_frame = |frame| {
@@ -355,7 +353,7 @@ fn positions_are_in_the_world_of_the_file() {
     let origin = DVec3::new(4096.0, -8192.0, 64.0);
     stage.scene.origin = origin;
     for node in &mut stage.scene.nodes {
-        if let candelabra::scene::Trs::Parts { translation, .. } = &mut node.local {
+        if let Trs::Parts { translation, .. } = &mut node.local {
             *translation += origin;
         }
     }
@@ -368,15 +366,12 @@ fn positions_are_in_the_world_of_the_file() {
     assert!((y[8 * 9 + 4] + 8192.0).abs() < 1e-3, "the floor is at {}", y[8 * 9 + 4]);
 }
 
-/// Two points whose sum is too large for a 32-bit number, before a card that covers the lower half.
+/// A point before a card that reflects more than a 32-bit number holds, in the lower half of the picture.
 #[test]
 fn samples_that_are_not_finite_are_left_out_counted_and_located() {
     let mut stage = Stage::default();
-    stage.quad([20.0, 10.0], lambert([1.0; 3]), at([0.0, -5.0, 0.0]));
-    for x in [-1.0, 1.0] {
-        let intensity_cd = Vec3::splat(3e38);
-        stage.light(LightKind::Point { intensity_cd }, at([x, 0.0, 0.7]));
-    }
+    stage.quad([20.0, 10.0], lambert([1e30; 3]), at([0.0, -5.0, 0.0]));
+    stage.light(LightKind::Point { intensity_cd: Vec3::splat(1e20) }, at([0.0, 0.0, 0.7]));
     stage.quad([1.0; 2], glow([5.0; 3]), at([0.0, 3.0, 0.0]));
     stage.look([0.0, 0.0, 8.0], DVec3::ZERO, 1.0);
     let settings = RenderSettings { strategy: LightStrategy::All, ..all_layers(16, 4) };
