@@ -10,10 +10,18 @@
 /// `whole`. All numbers must be finite and at least 0, and the parts must sum to the whole but for
 /// roundings.
 pub fn settle(parts: &mut [f32], whole: f32) {
-    if sum(parts) == whole {
-        return;
-    }
     debug_assert!(is_near(parts, whole), "{parts:?} are not the parts of {whole}");
+    // Once is enough, but for numbers so small that the roundings are larger than the largest part: it
+    // is 0 then, and the next one follows.
+    for _ in 0..parts.len() {
+        if sum(parts) == whole {
+            break;
+        }
+        settle_largest(parts, whole);
+    }
+}
+
+fn settle_largest(parts: &mut [f32], whole: f32) {
     let larger = |best: usize, at: usize| if parts[at] > parts[best] { at } else { best };
     let Some(largest) = (0..parts.len()).reduce(larger) else { return };
     // From the end to the largest part: what must the sum before each be? The numbers that give a sum
@@ -26,14 +34,14 @@ pub fn settle(parts: &mut [f32], whole: f32) {
             *part = part.next_up();
             missing(target, *part)
         });
-        target = before.unwrap_or(target);
+        target = before.unwrap_or((target - *part).max(0.0));
     }
     let (before, rest) = parts.split_at_mut(largest);
     let own = missing(target, sum(before)).or_else(|| {
         settle(before, sum(before).next_up());
         missing(target, sum(before))
     });
-    rest[0] = own.unwrap_or(rest[0]);
+    rest[0] = own.unwrap_or((target - sum(before)).max(0.0));
 }
 
 /// The number that gives `sum` with `part`, rounded to 32 bits; `None` if all that are near are ties.
@@ -48,7 +56,7 @@ fn sum(parts: &[f32]) -> f32 {
 
 fn is_near(parts: &[f32], whole: f32) -> bool {
     let sum: f64 = parts.iter().map(|&part| f64::from(part)).sum();
-    (sum - f64::from(whole)).abs() <= 1e-4 * f64::from(whole) + f64::from(f32::MIN_POSITIVE)
+    (sum - f64::from(whole)).abs() <= 1e-3 * f64::from(whole) + f64::from(f32::MIN_POSITIVE)
 }
 
 #[cfg(test)]

@@ -106,9 +106,11 @@ impl PixelMean {
             parts = [sorted[1], sorted[0], sorted[2]];
         }
         let [emission, direct, indirect] = parts;
-        for (number, layer) in shown.layers.iter().enumerate() {
-            let before = &shown.layers[..number];
-            let of_its_aov = before.iter().rev().take_while(|other| other.aov == layer.aov).count();
+        // The number of a layer among those of its kind.
+        let (mut last, mut own) = (None, 0);
+        for layer in shown.layers {
+            own = if last == Some(layer.aov) { own + 1 } else { 0 };
+            last = Some(layer.aov);
             match layer.aov {
                 Aov::Beauty => {
                     values.extend(beauty.to_array());
@@ -117,9 +119,10 @@ impl PixelMean {
                 Aov::Direct => values.extend(direct.to_array()),
                 Aov::Emission => values.extend(emission.to_array()),
                 Aov::Indirect => values.extend(indirect.to_array()),
-                Aov::LightGroups if of_its_aov > 0 => {}
+                Aov::LightGroups if own > 0 => {}
                 Aov::LightGroups => {
-                    self.push_groups(layer_count(shown, layer), beauty, scale / count, values)
+                    let groups = self.groups(layer_count(shown, layer), beauty, scale / count);
+                    values.extend(groups.iter().flat_map(|light| light.to_array()));
                 }
                 Aov::Depth if self.covered == 0 => values.push(f32::INFINITY),
                 Aov::Depth => values.push((self.depth_m / covered) as f32),
@@ -134,12 +137,12 @@ impl PixelMean {
                     values.extend(position.as_vec3().to_array());
                 }
                 Aov::Motion => {
-                    let motion = self.motion[of_its_aov] / count;
+                    let motion = self.motion[own] / count;
                     values.extend(motion.as_vec2().to_array());
                 }
                 Aov::Cryptomatte => {
                     let pairs = self.coverage.ranked(self.count);
-                    values.extend(&pairs[4 * of_its_aov..][..4]);
+                    values.extend(&pairs[4 * own..][..4]);
                 }
                 Aov::Variance => {
                     let degrees = count * (count - 1.0).max(1.0);
@@ -151,20 +154,11 @@ impl PixelMean {
     }
 
     /// The light groups, all at once: they sum to the beauty together.
-    fn push_groups(&self, groups: usize, beauty: Rgb, scale: f64, values: &mut Vec<f32>) {
-        let start = values.len();
-        for group in 0..groups {
-            let sum = self.by_group.get(group).copied().unwrap_or_default();
-            values.extend(brief(sum * scale).to_array());
-        }
-        let mut parts = vec![0.0; groups];
-        for channel in 0..3 {
-            let own = values[start + channel..].iter().step_by(3);
-            parts.iter_mut().zip(own).for_each(|(part, value)| *part = *value);
-            settle(&mut parts, beauty[channel]);
-            let own = values[start + channel..].iter_mut().step_by(3);
-            own.zip(&parts).for_each(|(value, part)| *value = *part);
-        }
+    fn groups(&self, count: usize, beauty: Rgb, scale: f64) -> Vec<Rgb> {
+        let sum = |group| self.by_group.get(group).copied().unwrap_or_default();
+        let mut parts: Vec<Rgb> = (0..count).map(|group| brief(sum(group) * scale)).collect();
+        settle_rgb(&mut parts, beauty);
+        parts
     }
 }
 
@@ -173,9 +167,9 @@ fn layer_count(shown: &Shown, layer: &Layer) -> usize {
     shown.layers.iter().filter(|other| other.aov == layer.aov).count()
 }
 
-fn settle_rgb(parts: &mut [Rgb; 3], whole: Rgb) {
+fn settle_rgb(parts: &mut [Rgb], whole: Rgb) {
     for channel in 0..3 {
-        let mut own = parts.map(|part| part[channel]);
+        let mut own: Vec<f32> = parts.iter().map(|part| part[channel]).collect();
         settle(&mut own, whole[channel]);
         parts.iter_mut().zip(own).for_each(|(part, own)| part[channel] = own);
     }

@@ -6,6 +6,7 @@ mod diff;
 mod disk;
 mod files;
 mod inspect;
+mod layers;
 mod lies;
 mod lights;
 mod names;

@@ -93,6 +93,13 @@ fn usage_is_exit_code_two() {
         "-o a.exr --look-from 1,2,3 --camera 0",
         "-o a.exr --look-from 1,2,3 --look-at 1,2,3",
         "-o a.exr --look-from 0,2,0 --look-at 0,0,0 --up 0,-9,0",
+        "-o a.exr --aov beauty,colour",
+        "-o a.exr --light-group /lamp",
+        "-o a.exr --light-group a.b=/lamp",
+        "-o a.exr --crop 0 0 4",
+        "-o a.exr --crop 0 0 4 -4",
+        "-o a.exr --res 8x6 --crop 0 0 9 6",
+        "-o a.exr --res 8x6 --crop 4 0 4 6",
         "-o a.####_##.exr",
         "-o a.%d%04d.exr",
     ] {

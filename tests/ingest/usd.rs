@@ -277,3 +277,15 @@ fn every_kind_of_light_varies() {
     assert!(sphere.instances.is_empty());
     assert_eq!(candelabra::pipeline::frames_of(&sphere), (1..=25).collect::<Vec<_>>());
 }
+
+#[test]
+fn a_light_group_is_of_the_node_that_names_it() {
+    let mut file = lamp();
+    assert!(file.load().unwrap().light_groups.is_empty());
+    file.json["nodes"][0]["extras"] = json!({"usdLux": {"type": "MeshLight", "group": "key 1"}});
+    let scene = file.load().unwrap();
+    let node = scene.instances[0].node;
+    assert_eq!(scene.light_groups.into_iter().collect::<Vec<_>>(), [(node, "key 1".to_string())]);
+    file.json["nodes"][0]["extras"]["usdLux"]["group"] = json!(7);
+    assert!(file.load().unwrap_err().to_string().contains("usdLux"));
+}
