@@ -20,8 +20,8 @@ use crate::scene::{Camera, Scene};
 use rayon::prelude::*;
 use thiserror::Error;
 
-/// After so many pixels of a row it is asked whether to stop: a row of a large picture takes long.
-const PIXELS_BETWEEN_STOPS: usize = 16;
+/// After so many samples it is asked whether to stop.
+const SAMPLES_BETWEEN_STOPS: u64 = 256;
 
 /// What does not change between the frames of a shot: geometry, textures, ray acceleration.
 pub struct RenderDelegate<'a> {
@@ -220,15 +220,16 @@ impl<'a> RenderDelegate<'a> {
     ) -> Option<FrameStats> {
         let (mut scratch, mut mean, mut values) =
             (PathScratch::default(), PixelMean::default(), Vec::new());
-        let mut stats = FrameStats::default();
+        let (mut stats, mut traced) = (FrameStats::default(), 0_u64);
         for (at, x) in (window.x0..window.x1).enumerate() {
-            if at % PIXELS_BETWEEN_STOPS == 0 && progress.is_stopped() {
-                return None;
-            }
             // A pixel's number is its place in the whole picture, so that a part of it has the same noise.
             let seed = hash(frame_seed, y * self.settings.width + x);
             mean.clear();
             for index in 0..self.settings.samples {
+                if traced % SAMPLES_BETWEEN_STOPS == 0 && progress.is_stopped() {
+                    return None;
+                }
+                traced += 1;
                 let sample = integrator.trace(x, y, seed, index, &mut scratch);
                 mean.add(&sample, &scratch.by_group, shown);
             }

@@ -411,9 +411,9 @@ fn a_stopped_frame_is_no_frame() {
     let stage = floor([true; 3]);
     let set = stage.set();
     let camera = stage.scene.cameras[0].clone();
-    let settings = RenderSettings { width: 40, height: 8, ..direct(1, 1) };
+    let settings = RenderSettings { width: 40, height: 8, samples: 16, ..direct(1, 1) };
     let delegate = RenderDelegate::new(&stage.scene, &set.emitters, camera, settings);
-    // It is asked at the columns 0, 16 and 32 of each row.
+    // It is asked at the samples 0, 256 and 512 of the 640 of each row.
     for questions in [0, 1, 13, 23] {
         let patience = Patience(AtomicU64::new(0), questions);
         assert!(
