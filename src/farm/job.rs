@@ -153,11 +153,12 @@ impl Job {
 
     fn parse(text: &str, path: &Path, root: &Path) -> Result<Job, Refusal> {
         let spec = cjsl::read(text)?;
-        let words = (word(&spec, "show")?, word(&spec, "shot")?, word(&spec, "user")?);
-        let (show, shot, user) =
-            (words.0.into(), conformed(&spec, "shot", words.1)?, words.2.into());
-        if user == "root" || spec.child("uid").is_some_and(|uid| uid.text.parse() == Ok(0)) {
-            return Err(spec.refuse("Cuebot runs nothing as root; name another <user>"));
+        let (show, shot) = (word(&spec, "show")?.to_owned(), word(&spec, "shot")?);
+        let shot = conformed(spec.child("shot").unwrap_or(&spec), "shot", shot)?;
+        let user = word(&spec, "user")?.to_owned();
+        let is_root = |child: &&Element| child.text == "root" || child.text.parse() == Ok(0);
+        if let Some(root) = spec.child("uid").filter(is_root).or(spec.child("user").filter(is_root)) {
+            return Err(root.refuse("Cuebot runs nothing as root; name another <user>"));
         }
         let element = only_job(&spec)?;
         let prefix = format!("{show}-{shot}-{user}_");

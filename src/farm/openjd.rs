@@ -75,8 +75,10 @@ fn openjd_range(frames: &[i32]) -> String {
     super::range::format(frames).replace('x', ":")
 }
 
-/// A script in which `{{`, which OpenJD would take for a reference, is broken up. It can stand in single quotes alone:
-/// in a command, a name or a value.
+/// A script in which `{{` and `}}`, which OpenJD would take for a reference, are broken up. They can stand in single
+/// quotes alone: in a command, a name or a value.
 fn without_braces(script: &str) -> String {
-    script.replace("{{", "{''{")
+    // The second time is for three in a row.
+    let apart = |script: &str| script.replace("{{", "{''{").replace("}}", "}''}");
+    apart(&apart(script))
 }

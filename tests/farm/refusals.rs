@@ -48,8 +48,7 @@ fn each_fault_is_named_with_its_place_and_remedy() {
     // What is replaced, by what, the place, and words of the message.
     let cases: &[(&str, &str, &str, &[&str])] = &[
         // XML.
-        ("</spec>", "", ":33:1:", &["<spec> is never closed"]),
-        ("<show>", "<show", "", &["no XML"]),
+        ("</spec>", "", ":3:1:", &["<spec> is never closed"]),
         ("</show>", "</shot>", ":3:", &["no XML"]),
         ("testing", "&bomb;", ":3:13:", &["&bomb;", "&amp;"]),
         ("testing", "te&#1;st", ":3:", &["\\u{1}"]),
@@ -71,7 +70,7 @@ fn each_fault_is_named_with_its_place_and_remedy() {
             "",
             &["no <colour>", "it takes cmd, range, chunk"],
         ),
-        ("<range>1</range>\n", "", ":8:1:", &["lacks <range>", "cmd, range, chunk"]),
+        ("<range>1</range>\n", "", ":7:1:", &["lacks <range>", "cmd, range, chunk"]),
         ("<chunk>4</chunk>\n", "", ":13:1:", &["lacks <chunk>"]),
         (
             "<cmd>true</cmd>\n<range>1</range>",
@@ -87,7 +86,7 @@ fn each_fault_is_named_with_its_place_and_remedy() {
         ),
         ("<chunk>4</chunk>", "<chunk>4</chunk><chunk>4</chunk>", ":13:17:", &["takes one <chunk>"]),
         ("<cmd>true", "<cmd><b/>true", ":6:6:", &["holds no elements", "<b>"]),
-        ("<layers>", "<layers>text", ":4:27:", &["no text"]),
+        ("<layers>", "<layers>text", ":4:28:", &["no text"]),
         ("name=\"two\" type", "name=\"two\" kind", ":10:1:", &["no attribute 'kind'"]),
         (
             "name=\"two\" type=\"Render\"",
@@ -102,9 +101,9 @@ fn each_fault_is_named_with_its_place_and_remedy() {
             &["Render, Util, Post"],
         ),
         // What Cuebot makes of it.
-        ("jane", "root", ":3:1:", &["root", "<user>"]),
-        ("sh010", "sh 010", ":3:34:", &["letters"]),
-        ("sh010", "s1", ":3:1:", &["three or more"]),
+        ("jane", "root", ":3:45:", &["root", "<user>"]),
+        ("sh010", "sh 010", ":3:27:", &["letters"]),
+        ("sh010", "s1", ":3:27:", &["three or more"]),
         ("name=\"two\"", "name=\"t!o\"", ":10:1:", &["letters"]),
         ("name=\"two\"", "name=\"One\"", ":10:1:", &["second layer is called one"]),
         ("<cmd>true</cmd>", "<cmd> </cmd>", ":6:1:", &["<cmd> is empty"]),
@@ -133,6 +132,7 @@ fn each_fault_is_named_with_its_place_and_remedy() {
         ("<depjob>tested", "<depjob>other", ":18:1:", &["is not the job of this file"]),
         ("<deplayer>two", "<deplayer>one", ":17:1:", &["wait for each other: one -> one"]),
     ];
+    let mut wrong = Vec::new();
     for (old, new, place, words) in cases {
         let good = text();
         assert!(good.contains(old), "{old} is not in\n{good}");
@@ -144,8 +144,13 @@ fn each_fault_is_named_with_its_place_and_remedy() {
         }
         let message = refusal(&bad);
         let is_told = words.iter().chain([place]).all(|word| message.contains(word));
-        assert!(is_told, "{old} -> {new}: {place} {words:?} are not all in\n{message}");
+        if !is_told {
+            wrong.push(format!("{old} -> {new}: {place} {words:?} are not all in
+{message}"));
+        }
     }
+    assert!(wrong.is_empty(), "{}", wrong.join("
+"));
 }
 
 #[test]
@@ -159,11 +164,8 @@ fn a_ring_is_refused_at_one_of_its_dependences() {
             ("two", "FRAME_BY_FRAME", "three"),
         ],
     ));
-    assert!(
-        message.contains("two -> three -> two") || message.contains("three -> two -> three"),
-        "{message}"
-    );
-    assert!(message.contains(":24:1:") || message.contains(":22:1:"), "{message}");
+    let told = ":26:1: layers wait for each other: two -> three -> two;";
+    assert!(message.contains(told), "{message}");
 }
 
 #[test]
@@ -174,7 +176,6 @@ fn entity_bombs_and_files_without_end_are_refused_without_being_read() {
         1,
     );
     assert!(refusal(&bomb).contains("declares entities"), "{bomb}");
-    // A quotation in the DOCTYPE hides no declaration.
     for path in ["/dev/zero", "/"] {
         let error = Job::read(Path::new(path)).unwrap_err().to_string();
         assert!(error.contains("no file"), "{error}");
