@@ -1,8 +1,8 @@
 //! A job as an Open Job Description template (`jobtemplate-2023-09`), in JSON.
 //!
 //! A layer is a step; what a layer waits for is a step's dependence, frame by frame or not, since steps depend
-//! as wholes. Frames are a `CHUNK[INT]` parameter, so a scheduler hands out chunks itself; it takes frames
-//! in rising order. Commands and environment come from [`shell`](super::shell). Memory and cores become
+//! as wholes. Frames are a `CHUNK[INT]` parameter, so the scheduler forms the chunks: of frames in rising order, of
+//! the layer's size or, to make them alike, a little less. Commands and environment come from [`shell`](super::shell). Memory and cores become
 //! host requirements. There are no retries: they are the scheduler's.
 
 use super::plan::{Plan, PlannedLayer};
@@ -24,9 +24,9 @@ fn step(plan: &Plan, planned: &PlannedLayer, root: &str) -> Value {
     let mut frames = planned.frames.clone();
     frames.sort_unstable();
     let is_contiguous = frames.windows(2).all(|pair| pair[1] == pair[0] + 1);
-    // OpenJD's chunks are OpenCue's but for the sign of a step.
+    // OpenJD's chunks are OpenCue's but for the sign of a step and a single frame, `7-7`.
     let script = format!(
-        "frames=$(printf %s '{{{{Task.Param.Frame}}}}' | tr : x)\n{}",
+        "frames=$(printf %s '{{{{Task.Param.Frame}}}}' | sed 's/:/x/g; s/^\\(-*[0-9]*\\)-\\1$/\\1/')\n{}",
         without_braces(&shell::chunk(plan, planned, root))
     );
     let mut run = json!({"command": "sh", "args": ["{{Task.File.Run}}"]});
