@@ -21,6 +21,7 @@ mod openjd;
 mod order;
 mod plan;
 pub mod range;
+mod reader;
 mod run;
 mod shell;
 mod slurm;

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import pytest
+from local_slurm import daemons, slurm  # noqa: F401
 from lxml import etree
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -145,12 +145,20 @@ fn each_fault_is_named_with_its_place_and_remedy() {
         let message = refusal(&bad);
         let is_told = words.iter().chain([place]).all(|word| message.contains(word));
         if !is_told {
-            wrong.push(format!("{old} -> {new}: {place} {words:?} are not all in
-{message}"));
+            wrong.push(format!(
+                "{old} -> {new}: {place} {words:?} are not all in
+{message}"
+            ));
         }
     }
-    assert!(wrong.is_empty(), "{}", wrong.join("
-"));
+    assert!(
+        wrong.is_empty(),
+        "{}",
+        wrong.join(
+            "
+"
+        )
+    );
 }
 
 #[test]

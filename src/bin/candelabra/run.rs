@@ -88,13 +88,13 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let plans: Vec<Plan> =
         jobs.iter().map(|job| Plan::new(job, &selection)).collect::<Result<_, _>>()?;
     if arguments.dry_run {
-        plans.iter().try_for_each(|plan| print_commands(plan, &options(arguments, plan.job)))?;
+        plans.iter().try_for_each(|plan| print_commands(plan, &options(arguments, plan.job)?))?;
         return Ok(ExitCode::SUCCESS);
     }
     let mut display = Display::new(arguments.progress, &plans)?;
     let (mut is_done, mut signal) = (true, None);
     for plan in &plans {
-        let options = options(arguments, plan.job);
+        let options = options(arguments, plan.job)?;
         display.begin(plan);
         let summary = carry_out(plan, &options, &mut display)?;
         display.end(&summarise(arguments, plan, &options, &summary), summary.is_done());
@@ -111,13 +111,11 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     })
 }
 
-fn options(arguments: &Arguments, job: &Job) -> RunOptions {
-    let root = arguments.root.as_ref().unwrap_or(&job.root);
-    RunOptions {
-        logs: root.join(&arguments.logs),
-        root: root.clone(),
-        retries: arguments.retries.unwrap_or(job.retries),
-    }
+fn options(arguments: &Arguments, job: &Job) -> io::Result<RunOptions> {
+    // The commands are told of the logs and run elsewhere.
+    let root = std::path::absolute(arguments.root.as_ref().unwrap_or(&job.root))?;
+    let retries = arguments.retries.unwrap_or(job.retries);
+    Ok(RunOptions { logs: root.join(&arguments.logs), root, retries })
 }
 
 fn print_commands(plan: &Plan, options: &RunOptions) -> io::Result<()> {

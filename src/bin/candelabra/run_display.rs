@@ -124,10 +124,8 @@ impl Display {
     /// Tells how far all is, if that is another percent than before.
     fn percent(&mut self, task: &Task) {
         let done = (self.ended as f64 + self.part * task.frames.len() as f64) / self.all as f64;
-        let percent = Some((100.0 * done) as u64);
-        if self.percent != percent {
-            self.percent = percent;
-            let percent = percent.unwrap_or(0);
+        let percent = (100.0 * done) as u64;
+        if self.percent.replace(percent) != Some(percent) {
             match self.progress {
                 Progress::Alfred => self.line(format_args!("ALF_PROGRESS {percent}%")),
                 Progress::Openjd => self.line(format_args!("openjd_progress: {percent}")),

@@ -50,8 +50,11 @@ pub fn run(
     watch: &mut dyn RunWatch,
 ) -> io::Result<Ending> {
     let planned = &plan.layers[task.layer];
-    let mut log = log::open(log_path, attempt)?;
-    writeln!(log, "# attempt {attempt} in {}\n# {}", options.root.display(), task.command)?;
+    let no_log =
+        |error: io::Error| io::Error::new(error.kind(), format!("{}: {error}", log_path.display()));
+    let mut log = log::open(log_path, attempt).map_err(no_log)?;
+    writeln!(log, "# attempt {attempt} in {}\n# {}", options.root.display(), task.command)
+        .map_err(no_log)?;
     let mut last_line = log.try_clone()?;
     let (output, input) = io::pipe()?;
     let threads = planned.threads().map_or_else(thread::available_parallelism, |threads| {
@@ -71,7 +74,10 @@ pub fn run(
         .stdout(input.try_clone()?)
         .stderr(input)
         .process_group(0);
-    let mut child = command.spawn()?;
+    let mut child = command.spawn().map_err(|error| {
+        let why = format!("no command can be started in {}: {error}", options.root.display());
+        io::Error::new(error.kind(), why)
+    })?;
     // The writing ends in `command` would keep the pipe open.
     drop(command);
     let group = Group(Pid::from_child(&child));

@@ -192,9 +192,9 @@ fn attempt(
     let log = log_path(options, plan, task);
     for attempt in 1.. {
         watch.tell(RunEvent::Started { task, attempt, log: &log });
-        let system = |error: io::Error| Fault::System(format!("{}: {error}", log.display()));
-        let ending = command::run(plan, options, task, attempt, &log, watch).map_err(system);
-        let Ending { fault, signal, up_to_date } = ending.unwrap_or_else(Ending::of);
+        let ending = command::run(plan, options, task, attempt, &log, watch);
+        let Ending { fault, signal, up_to_date } =
+            ending.unwrap_or_else(|error| Ending::of(Fault::System(error.to_string())));
         match fault {
             None => {
                 *stopped = signal;
