@@ -2,8 +2,8 @@
 
 use super::cjsl::{Element, Refusal};
 use super::reader::from_text;
-use std::fs::File;
-use std::io::{self, Read};
+use crate::store::read_regular;
+use std::io;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 
@@ -136,7 +136,9 @@ impl Job {
     /// The first thing in the file that is wrong: see [`JobError`].
     pub fn read(path: &Path) -> Result<Job, JobError> {
         let unreadable = |error| JobError::Unreadable { path: path.into(), error };
-        let text = read_text(path).map_err(unreadable)?;
+        let bytes = read_regular(path, LONGEST_FILE).map_err(unreadable)?;
+        let no_text = |_| unreadable(io::Error::other("is not UTF-8; save it as UTF-8"));
+        let text = String::from_utf8(bytes).map_err(no_text)?;
         let absolute = std::path::absolute(path).map_err(unreadable)?;
         let folder = absolute.parent().unwrap_or(Path::new("/"));
         let is_pipelines = folder.file_name().is_some_and(|name| name == "pipelines");
@@ -150,18 +152,4 @@ impl Job {
     pub fn full_name(&self) -> String {
         format!("{}-{}-{}_{}", self.show, self.shot, self.user, self.name).to_lowercase()
     }
-}
-
-/// A text file of bounded length.
-fn read_text(path: &Path) -> io::Result<String> {
-    let file = File::open(path)?;
-    if !file.metadata()?.is_file() {
-        return Err(io::Error::other("is no file; give a job file"));
-    }
-    let mut bytes = Vec::new();
-    file.take(LONGEST_FILE + 1).read_to_end(&mut bytes)?;
-    if bytes.len() as u64 > LONGEST_FILE {
-        return Err(io::Error::other("is longer than 16 MiB; this is no job file"));
-    }
-    String::from_utf8(bytes).map_err(|_| io::Error::other("is not UTF-8; save it as UTF-8"))
 }

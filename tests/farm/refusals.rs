@@ -185,11 +185,11 @@ fn entity_bombs_and_files_without_end_are_refused_without_being_read() {
     );
     assert!(refusal(&bomb).contains("declares entities"), "{bomb}");
     for path in ["/dev/zero", "/"] {
-        let error = Job::read(Path::new(path)).unwrap_err().to_string();
-        assert!(error.contains("no file"), "{error}");
+        let error = Job::read(Path::new(path)).unwrap_err();
+        assert!(matches!(error, JobError::Unreadable { .. }), "{error}");
     }
     let folder = Folder::with(&" ".repeat((16 << 20) + 1));
-    assert!(Job::read(&folder.path(JOB)).unwrap_err().to_string().contains("16 MiB"));
+    assert!(Job::read(&folder.path(JOB)).unwrap_err().to_string().contains("more than"));
     let deep = "<layers>".repeat(100_000);
     assert!(refusal(&text().replacen("<layers>", &deep, 1)).contains("<layers>"));
 }

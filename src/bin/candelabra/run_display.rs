@@ -82,10 +82,15 @@ impl Display {
 
     /// Begins a job.
     pub fn begin(&mut self, plan: &Plan) {
-        if self.progress == Progress::Plain {
-            let layers: Vec<_> =
-                plan.layers.iter().map(|planned| planned.layer.name.as_str()).collect();
-            self.line(format_args!("{}: {}", plan.job.name, layers.join(", ")));
+        let layers: Vec<_> =
+            plan.layers.iter().map(|planned| planned.layer.name.as_str()).collect();
+        let job = &plan.job.name;
+        match self.progress {
+            Progress::Plain => self.line(format_args!("{job}: {}", layers.join(", "))),
+            Progress::Json => {
+                self.line(json!({"event": "job-started", "job": job, "layers": layers}))
+            }
+            _ => {}
         }
         if self.progress != Progress::Auto {
             return;
@@ -98,7 +103,13 @@ impl Display {
             let bar = self.bars.add(ProgressBar::new(length as u64).with_style(style.clone()));
             bar.set_prefix(planned.layer.name.clone());
             bar.tick();
-            self.layers.push(LayerBar { bar, frames: planned.frames.len(), ended: 0, began: None });
+            self.layers.push(LayerBar {
+                bar,
+                frames: planned.frames.len(),
+                done: 0,
+                trouble: None,
+                began: None,
+            });
         }
     }
 
@@ -204,9 +215,7 @@ impl Display {
             _ => {}
         }
         if let Some(layer) = self.layers.get_mut(task.layer) {
-            layer.ended += task.frames.len();
-            let left = layer.advance(0.0);
-            layer.bar.set_message(if layer.ended < layer.frames { left } else { text });
+            layer.end(task.frames.len(), outcome, text);
         }
         self.percent(task);
     }
@@ -233,15 +242,33 @@ impl Display {
 struct LayerBar {
     bar: ProgressBar,
     frames: usize,
-    /// Frames of tasks that have ended.
-    ended: usize,
+    /// Frames of tasks that have ended well, and what is said of those that have not.
+    done: usize,
+    trouble: Option<String>,
     began: Option<Instant>,
 }
 
 impl LayerBar {
-    /// Moves the bar to so many frames beyond those of the tasks that have ended; says what time is left.
+    /// Ends a task of so many frames.
+    fn end(&mut self, frames: usize, outcome: &Outcome, text: String) {
+        match outcome {
+            Outcome::Done { .. } => self.done += frames,
+            _ => self.trouble = Some(text.clone()),
+        }
+        let left = self.advance(0.0);
+        let whole = match (outcome, self.began) {
+            (Outcome::Done { up_to_date: false }, Some(began)) => {
+                format!("done in {}", time(began.elapsed()))
+            }
+            _ => text,
+        };
+        let message = if self.done < self.frames { left } else { whole };
+        self.bar.set_message(self.trouble.clone().unwrap_or(message));
+    }
+
+    /// Moves the bar to so many frames beyond those that are done; says what time is left.
     fn advance(&self, frames: f64) -> String {
-        let done = self.ended as f64 + frames;
+        let done = self.done as f64 + frames;
         self.bar.set_position((done * PARTS) as u64);
         match self.began {
             Some(began) if done > 0.0 => {
