@@ -14,7 +14,7 @@
 //! | floor | rooms | |
 //! |---|---|---|
 //! | 7 | `bin/candelabra`, `bin/candelabra-render` | arguments, progress, exit codes |
-//! | 6 | [`diff`], [`inspect`] | what changed between two versions of a scene; what is in one |
+//! | 6 | [`diff`], [`farm`], [`inspect`] | what changed between two versions of a scene; jobs of many frames; what is in a scene |
 //! | 5 | [`pipeline`] | jobs and stages: the only place where ingest meets the tree |
 //! | 4 | [`measure`] | strategies side by side: exact variance, error against time |
 //! | 3 | [`render`] | a path tracer that finds its lights through the tree |
@@ -58,6 +58,7 @@
 pub mod bounds;
 pub mod diff;
 pub mod emitter;
+pub mod farm;
 pub mod ingest;
 pub mod inspect;
 pub mod light_tree;
