@@ -17,19 +17,8 @@ pub const LIGHTS: SectionId = SectionId(*b"LGHT");
 pub const PATHS: SectionId = SectionId(*b"PATH");
 pub const TEXTURES: SectionId = SectionId(*b"TXTR");
 pub const MEANS: SectionId = SectionId(*b"MEAN");
-pub const ALL: [SectionId; 11] = [
-    META,
-    TREES,
-    GROUPS,
-    INSTANCES,
-    FRAMES,
-    FINGERPRINTS,
-    FORCED,
-    LIGHTS,
-    PATHS,
-    TEXTURES,
-    MEANS,
-];
+pub const ALL: [SectionId; 11] =
+    [META, TREES, GROUPS, INSTANCES, FRAMES, FINGERPRINTS, FORCED, LIGHTS, PATHS, TEXTURES, MEANS];
 
 /// One tree of a file.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]

@@ -17,10 +17,7 @@ const MOST_BYTES: usize = 1 << 22;
 const BOUNDS: usize = 53;
 
 /// Over the shot, by that of what stands still and those of its frames.
-pub(super) fn of_shot(
-    still: &[u8; 32],
-    frames: impl Iterator<Item = (i32, [u8; 32])>,
-) -> [u8; 32] {
+pub(super) fn of_shot(still: &[u8; 32], frames: impl Iterator<Item = (i32, [u8; 32])>) -> [u8; 32] {
     let mut hasher = Hasher::new();
     hasher.update(still);
     for (frame, fingerprint) in frames {
@@ -90,7 +87,8 @@ pub(super) fn of_bounds(bounds: &[LightBounds]) -> [u8; 32] {
         hasher.update(&bytes_of(one));
     } else {
         for part in bounds.chunks(MOST_BYTES / BOUNDS) {
-            let bytes: Vec<[u8; BOUNDS]> = part.par_iter().with_min_len(TOGETHER).map(bytes_of).collect();
+            let bytes: Vec<[u8; BOUNDS]> =
+                part.par_iter().with_min_len(TOGETHER).map(bytes_of).collect();
             hasher.update_rayon(bytes.as_flattened());
         }
     }

@@ -8,14 +8,15 @@
 use super::agreement::Agreement;
 use super::build::build_frame;
 use super::fingerprint;
-use super::fresh::{TreeError, contradicts, stale};
+use super::fresh::{TreeError, contradicts, open_tree, stale};
 use super::survey::{SurveyedFrame, class_of};
 use super::surveyor::Surveyor;
+use super::textures::collect_emitters;
 use crate::emitter::{Emitters, LightEntry};
 use crate::light_tree::{LightLook, LightSummary, LightTree};
 use crate::scene::Scene;
 use crate::store::AlignedBytes;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// The light trees of a shot, frame after frame.
 pub struct ShotTrees<'a> {
@@ -170,11 +171,10 @@ impl<'a> ShotTrees<'a> {
         Ok(())
     }
 
-    fn agreement<'s>(
-        &'s self,
-        frames: &'s [SurveyedFrame],
-    ) -> Agreement<'s, &'a [u8]> {
-        let Source::File { file, .. } = &self.source else { unreachable!("only files are compared") };
+    fn agreement<'s>(&'s self, frames: &'s [SurveyedFrame]) -> Agreement<'s, &'a [u8]> {
+        let Source::File { file, .. } = &self.source else {
+            unreachable!("only files are compared")
+        };
         let Surveyor { shared, lasting, still, .. } = &self.surveyor;
         let changing = frames.iter().map(|frame| &*frame.group).collect();
         Agreement { tree: &file.tree, shared, lasting: *lasting, still, changing }
@@ -200,10 +200,49 @@ impl<'a> ShotTrees<'a> {
         let tree = LightTree::open(bytes).expect("what was just built can be opened");
         if let Some(earlier) = earlier {
             let stills = tree.still_tree().zip(earlier.still_tree());
-            tree.know_digests(earlier, (0..self.surveyor.lasting as u32).map(|row| (row, row)).chain(stills));
+            tree.know_digests(
+                earlier,
+                (0..self.surveyor.lasting as u32).map(|row| (row, row)).chain(stills),
+            );
         }
         *last = Some(BuiltFrame { fingerprint, number, tree });
         self.surveyor.forget_still();
         Ok(())
     }
+}
+
+/// Where the trees of a shot are to come from.
+#[derive(Clone, Debug, Default)]
+pub struct TreeChoice {
+    /// A tree file; if there is none, trees are built.
+    pub file: Option<PathBuf>,
+    /// What the user forces in addition to what the scene forces.
+    pub forced: Vec<String>,
+    /// Whether to prove what a frame samples of the file, and to compare its leaves with the scene's lights.
+    pub verify: bool,
+}
+
+/// Calls `work` with the emitters of a scene and the trees over them: what a process does with lights before
+/// its first frame. `watch` is told how many textured triangles are integrated, of how many.
+///
+/// # Errors
+/// If the file cannot be opened, or is not one of this scene; whatever `work` says.
+pub fn with_trees<T, E: From<TreeError>>(
+    scene: &Scene,
+    choice: &TreeChoice,
+    watch: &(dyn Fn(u64, u64) + Sync),
+    work: impl FnOnce(&Emitters, ShotTrees) -> Result<T, E>,
+) -> Result<T, E> {
+    let opened = choice.file.as_deref().map(|path| Ok((open_tree(path, false)?, path)));
+    let opened = opened.transpose().map_err(E::from)?;
+    let emitters = collect_emitters(scene, opened.as_ref().map(|(tree, _)| tree), watch);
+    let trees = match &opened {
+        None => ShotTrees::built(scene, &emitters)?,
+        Some((tree, path)) => {
+            let tree = tree.by_reference();
+            let file = TreeFile { tree, path, forced: &choice.forced, verify: choice.verify };
+            ShotTrees::of_file(scene, &emitters, file)?
+        }
+    };
+    work(&emitters, trees)
 }

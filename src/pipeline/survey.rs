@@ -102,7 +102,8 @@ pub fn survey(scene: &Scene, emitters: &Emitters, frames: &[i32]) -> Result<Surv
         surveyed.push(frame);
     }
     // The look of a changing light is that in the first frame.
-    let second = surveyed.first().map_or(0.0, |frame| scene.timeline.seconds_at(frame.number.into()));
+    let second =
+        surveyed.first().map_or(0.0, |frame| scene.timeline.seconds_at(frame.number.into()));
     let pose = scene.pose_at(second);
     let looks = looks(&PosedEmitters { scene, emitters, pose: &pose });
     let Surveyor { shared, still, still_fingerprint, .. } = surveyor;

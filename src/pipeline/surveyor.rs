@@ -57,8 +57,7 @@ impl<'a> Surveyor<'a> {
         surveyor.still_energy = surveyor.energy_of(&surveyor.still);
         surveyor.check_total(&surveyor.still, 0.0)?;
         let Surveyor { still, shared, .. } = &surveyor;
-        surveyor.still_fingerprint =
-            fingerprint::of_still(scene.origin, emitters, still, shared);
+        surveyor.still_fingerprint = fingerprint::of_still(scene.origin, emitters, still, shared);
         Ok(surveyor)
     }
 

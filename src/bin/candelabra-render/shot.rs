@@ -7,7 +7,7 @@ use anyhow::{Context, Result, bail};
 use candelabra::emitter::Emitters;
 use candelabra::light_tree::{ALGORITHM_VERSION, LightTree};
 use candelabra::page::Plain;
-use candelabra::pipeline::{self, OpenedTree, ShotTrees, TreeError, TreeFile};
+use candelabra::pipeline::{self, OpenedTree, TreeChoice, TreeError, with_trees};
 use candelabra::render::exr::{ExrOptions, read_metadata, write_exr};
 use candelabra::render::frames::Frames;
 use candelabra::render::png::{exposure_for, write_png};
@@ -55,43 +55,45 @@ pub fn render(arguments: &Arguments) -> Result<usize> {
     }
     let camera = look.camera;
     refuse_to_overwrite(arguments, &scene, &frames)?;
-    match &arguments.tree {
-        Some(path) => {
-            let tree = pipeline::open_tree(path, false)?;
-            let emitters = collect(&scene, Some(&tree));
-            let file = TreeFile {
-                tree: tree.by_reference(),
-                path,
-                forced: &arguments.force_light,
-                verify: !arguments.no_verify,
-            };
-            let mut trees = ShotTrees::of_file(&scene, &emitters, file)?;
-            for &frame in frames.as_slice() {
-                match trees.for_frame(frame) {
-                    // The delegate says so of each frame.
-                    Ok(_) | Err(TreeError::NoSuchFrame { .. }) => {}
-                    Err(error) => return Err(error.into()),
+    if let Some(path) = &arguments.tree {
+        let choice = TreeChoice {
+            file: Some(path.clone()),
+            forced: arguments.force_light.clone(),
+            verify: !arguments.no_verify,
+        };
+        let bar = TextureBar::new();
+        return with_trees(
+            &scene,
+            &choice,
+            &|done, all| bar.show(done, all),
+            |emitters, mut trees| {
+                let mut checked = None;
+                for &frame in frames.as_slice() {
+                    match trees.for_frame(frame) {
+                        Ok(_) => checked = Some(frame),
+                        // If there is another frame, the delegate says so of this one.
+                        Err(TreeError::NoSuchFrame { .. }) => {}
+                        Err(error) => return Err(error.into()),
+                    }
                 }
-            }
-            drop(trees);
-            render_frames(arguments, &scene, &emitters, &tree, camera, &frames)
-        }
-        None => {
-            let emitters = collect(&scene, None);
-            let mut ascending = frames.as_slice().to_vec();
-            ascending.sort_unstable();
-            let survey = pipeline::survey(&scene, &emitters, &ascending)?;
-            let bytes = pipeline::build_tree(&survey);
-            let tree = LightTree::open(bytes)?;
-            render_frames(arguments, &scene, &emitters, &tree, camera, &frames)
-        }
+                let tree = trees.for_frame(checked.unwrap_or(frames.as_slice()[0]))?;
+                render_frames(arguments, &scene, emitters, &tree, camera, &frames)
+            },
+        );
     }
+    let emitters = collect(&scene);
+    let mut ascending = frames.as_slice().to_vec();
+    ascending.sort_unstable();
+    let survey = pipeline::survey(&scene, &emitters, &ascending)?;
+    let bytes = pipeline::build_tree(&survey);
+    let tree = LightTree::open(bytes)?;
+    render_frames(arguments, &scene, &emitters, &tree, camera, &frames)
 }
 
 /// The emitters of a scene, with a progress bar if that takes long.
-fn collect(scene: &Scene, tree: Option<&OpenedTree>) -> Emitters {
+fn collect(scene: &Scene) -> Emitters {
     let bar = TextureBar::new();
-    pipeline::collect_emitters(scene, tree, &|done, all| bar.show(done, all))
+    pipeline::collect_emitters(scene, None::<&OpenedTree>, &|done, all| bar.show(done, all))
 }
 
 /// No picture may replace what it is rendered from.

@@ -67,7 +67,8 @@ impl<D: AsRef<[u8]> + Sync> LightTree<D> {
             check(follows && is_there, rules::FRAMES_USE_FORCED, row)?;
             self.verify_forced(first_forced as usize..next_forced as usize)?;
         }
-        let is_told = self.fingerprints().is_empty() || self.fingerprints().len() == self.frames().len();
+        let is_told =
+            self.fingerprints().is_empty() || self.fingerprints().len() == self.frames().len();
         check_all(is_told, rules::FRAMES_HAVE_FINGERPRINTS)?;
         if self.frames().is_empty() {
             return self.verify_forced(0..self.forced().len());
