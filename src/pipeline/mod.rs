@@ -2,11 +2,13 @@
 //!
 //! [`load_scene`] reads a scene; [`collect_emitters`] finds what shines in it; [`survey()`] finds out
 //! what its tree depends on; [`build_tree`] builds the trees of a shot; [`check_fresh`] tells whether
-//! a tree still belongs to a scene, and if not, which lights changed. [`look()`] finds
-//! the camera that a user means, and makes one where there is none.
+//! a tree still belongs to a scene, and if not, which lights changed. [`ShotTrees`] gives the trees of a
+//! shot frame by frame, from a file or built. [`look()`] finds the camera that a user means, and makes one
+//! where there is none. [`BuildJob`] is `candelabra build`, told to a [`Watch`].
 
 mod agreement;
 mod build;
+mod build_job;
 mod content;
 mod fingerprint;
 mod fit;
@@ -28,6 +30,7 @@ mod watch;
 
 pub use agreement::{Contradiction, Standing, standing};
 pub use build::{Rebuilt, build_tree, origin_of, rebuild_tree};
+pub use build_job::{BreakEven, BuildError, BuildJob, BuildReport, Built, TakenOver};
 pub use content::scene_fingerprint;
 pub use forced::{NoLightThere, force_lights};
 pub use frames::frames_of;
@@ -39,7 +42,7 @@ pub use render_job::{
     FrameCounts, Preview, RenderError, RenderJob, RenderReport, SceneCounts, Seconds,
 };
 pub use rig::carry_camera;
-pub use shot_trees::{ShotTrees, TreeFile};
+pub use shot_trees::{ShotTrees, TreeChoice, TreeFile, with_trees};
 pub use stamp::{PreviewStamp, Stamp, Stamper};
 pub use strict::{Strict, StrictError};
 pub use survey::{Group, PlacedLight, SharedBounds, Survey, SurveyedFrame, survey};
