@@ -1,13 +1,15 @@
 //! `candelabra build`: a scene in, a tree file out.
 
-use crate::texture_bar::TextureBar;
+use crate::display::{Display, Progress};
+use crate::stop::{STOPPED, Stop};
 use anyhow::Result;
-use candelabra::page::{Lines, Plain, counted};
-use candelabra::pipeline::{BreakEven, BuildJob, BuildReport, Built, Event, Strict, Watch};
+use candelabra::page::{Lines, counted};
+use candelabra::pipeline::{BreakEven, BuildError, BuildJob, BuildReport, Built, Strict};
 use candelabra::render::frames::Frames;
 use clap::Args;
 use std::io::Write;
 use std::path::PathBuf;
+use std::process::ExitCode;
 use std::time::Duration;
 
 #[derive(Args)]
@@ -39,9 +41,11 @@ pub struct Arguments {
     /// --strict=lights,cameras (lights, materials, geometry, cameras, animation, other)
     #[arg(long, value_name = "CATEGORIES", num_args = 0..=1, require_equals = true, default_missing_value = Strict::EVERYTHING)]
     strict: Option<Strict>,
+    #[command(flatten)]
+    progress: Progress,
 }
 
-pub fn run(arguments: &Arguments) -> Result<()> {
+pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     if let Some(threads) = arguments.threads {
         rayon::ThreadPoolBuilder::new().num_threads(threads.into()).build_global()?;
     }
@@ -55,27 +59,18 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         force: *force,
         strict: strict.clone(),
     };
-    let report = job.run(&Terminal { textures: TextureBar::new() })?;
-    print(&mut Lines(std::io::stdout().lock()), &job, &report)
-}
-
-/// Notes go to stderr; how many textured triangles are integrated, to a bar.
-struct Terminal {
-    textures: TextureBar,
-}
-
-impl Watch for Terminal {
-    fn tell(&self, event: Event) {
-        /// The length of the bar.
-        const LENGTH: f64 = 1e6;
-        match event {
-            Event::Note { text } => eprintln!("note: {}", Plain(text)),
-            Event::Progress { done, .. } => {
-                self.textures.show((done * LENGTH) as u64, LENGTH as u64);
-            }
-            _ => {}
+    let stop = Stop::listen()?;
+    let display = Display::new(arguments.progress, &stop);
+    let report = match job.run(&display) {
+        Err(BuildError::Stopped) => {
+            eprintln!("candelabra: {}", BuildError::Stopped);
+            return Ok((STOPPED + stop.signal().unwrap_or_default()).into());
         }
-    }
+        report => report?,
+    };
+    drop(display);
+    print(&mut Lines(std::io::stdout().lock()), &job, &report)?;
+    Ok(ExitCode::SUCCESS)
 }
 
 fn print(out: &mut impl Write, job: &BuildJob, report: &BuildReport) -> Result<()> {
