@@ -1,10 +1,17 @@
 //! Floor 5: jobs, the only place where ingest meets the tree.
 //!
-//! [`load_scene`] reads a scene; [`collect_emitters`] finds what shines in it; [`survey()`] finds out
-//! what its tree depends on; [`build_tree`] builds the trees of a shot; [`check_fresh`] tells whether
-//! a tree still belongs to a scene, and if not, which lights changed. [`ShotTrees`] gives the trees of a
-//! shot frame by frame, from a file or built. [`look()`] finds the camera that a user means, and makes one
-//! where there is none. [`BuildJob`] is `candelabra build`, told to a [`Watch`].
+//! A job is what one run of a program does: [`BuildJob`] and [`RenderJob`]. It tells [`Event`]s to a
+//! [`Watch`], prints nothing, and reads the clock only to report where time went. Jobs are made of stages:
+//!
+//! | stage | question |
+//! |---|---|
+//! | [`load_scene`], [`force_lights`], [`Strict`] | what is in the file, and is it good enough? |
+//! | [`look()`] | which camera does the user mean? |
+//! | [`collect_emitters`], [`survey()`] | what shines, and what do its trees depend on? |
+//! | [`build_tree`], [`rebuild_tree`] | the trees of a shot, anew or upon an earlier file |
+//! | [`ShotTrees`] | the trees of one frame after the other: from a file, or built |
+//! | [`check_fresh`], [`standing`] | does a whole file still belong to the scene; if not, which lights changed? |
+//! | [`Stamp`] | what was a picture rendered from? |
 
 mod agreement;
 mod build;
