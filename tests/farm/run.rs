@@ -145,9 +145,11 @@ fn parts_of_a_job_are_chosen_by_layer_and_frame() {
 #[test]
 fn events_are_read_and_told_and_what_is_no_event_is_logged() {
     let command = r#"echo plain; echo '{"event":"up-to-date","frame":1,"output":"a.exr"}'; printf 'no end' >&2"#;
-    let folder = Folder::with(&job(&[("kept", command, "1", 1), ("new", "true", "1", 1)], &[]));
+    let made = r#"echo '{"event":"frame-done","frame":1,"seconds":1.5,"rays":1,"light_picks":1,"output":"b.exr"}'"#;
+    let folder = Folder::with(&job(&[("kept", command, "1", 1), ("new", made, "1", 1)], &[]));
     let told = folder.ends("run tested.xml", 0);
     assert!(told.out.contains("0001-kept: up to date\n"), "{told:#?}");
+    assert!(told.out.contains("  frame 1 in 1.5 s"), "{told:#?}");
     assert!(told.out.contains("2 of 2 tasks done, 1 of them up to date before"), "{told:#?}");
     let log = folder.read("out/logs/tested/0001-kept.rqlog");
     assert!(log.contains("\nplain\na.exr: up to date\nno end"), "{log}");
