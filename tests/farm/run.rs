@@ -56,6 +56,7 @@ fn commands_run_beside_the_pipelines() {
     let folder = Folder::with("");
     folder.write("shots/a/pipelines/x.xml", &text);
     folder.write("shots/b/x.xml", &text);
+    folder.write("shots/.venv/no_job.xml", "<table/>");
     std::fs::remove_file(folder.path(JOB)).unwrap();
     folder.ends("run shots", 0);
     for root in ["shots/a", "shots/b"] {
@@ -179,6 +180,16 @@ fn what_a_command_leaves_running_is_ended_with_it() {
     // It may be a zombie for a moment.
     let state = std::fs::read_to_string(is_there).unwrap_or_default();
     assert!(state.is_empty() || state.contains(") Z "), "{state}");
+}
+
+#[test]
+fn a_process_that_has_left_its_group_and_prints_for_ever_does_not_keep_the_run() {
+    let command = "setsid sh -c 'touch left; while test -e go; do echo x; sleep 0.01; done' & \
+                   while ! test -e left; do sleep 0.01; done";
+    let folder = Folder::with(&job(&[("left", command, "1", 1)], &[]));
+    folder.write("go", "");
+    folder.ends("run tested.xml", 0);
+    std::fs::remove_file(folder.path("go")).unwrap();
 }
 
 #[test]
