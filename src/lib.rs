@@ -14,7 +14,7 @@
 //! | floor | rooms | |
 //! |---|---|---|
 //! | 7 | `bin/candelabra`, `bin/candelabra-render` | arguments, progress, exit codes |
-//! | 6 | [`diff`], [`farm`], [`inspect`] | what changed between two versions of a scene; jobs of many frames; what is in a scene |
+//! | 6 | [`diff`], [`farm`], [`inspect`] | two versions of a scene; jobs of many frames; one scene |
 //! | 5 | [`pipeline`] | jobs and stages: the only place where ingest meets the tree |
 //! | 4 | [`measure`] | strategies side by side: exact variance, error against time |
 //! | 3 | [`render`] | a path tracer that finds its lights through the tree |

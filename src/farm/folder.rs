@@ -3,16 +3,20 @@
 use super::job::{Job, JobError};
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
-use walkdir::WalkDir;
+use walkdir::{DirEntry, WalkDir};
 
-/// Reads a job file; or all of a folder and the folders in it, `*.xml` in the order of their paths.
+/// Reads a job file; or all of a folder and the folders in it, `*.xml` in the order of their paths, but
+/// for hidden ones.
 ///
 /// # Errors
 /// All files that are refused, and jobs of one name whose logs would be mixed up. The list is never empty.
 pub fn read_jobs(path: &Path) -> Result<Vec<Job>, Vec<JobError>> {
     let (mut jobs, mut errors) = (Vec::new(), Vec::new());
     let mut names: HashMap<(PathBuf, String), PathBuf> = HashMap::new();
-    for entry in WalkDir::new(path).sort_by_file_name() {
+    let is_seen = |entry: &DirEntry| {
+        entry.depth() == 0 || !entry.file_name().as_encoded_bytes().starts_with(b".")
+    };
+    for entry in WalkDir::new(path).sort_by_file_name().into_iter().filter_entry(is_seen) {
         let entry = match entry {
             Ok(entry) => entry,
             Err(error) => {

@@ -43,7 +43,7 @@ pub struct Layer {
     pub name: String,
     /// What kind of work it is.
     pub kind: LayerKind,
-    /// A line of `sh`, with [`tokens`].
+    /// A line of `sh`, with [`tokens`](super::tokens).
     pub command: String,
     /// Its frames in order, each once; at least one.
     pub frames: Vec<i32>,

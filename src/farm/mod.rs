@@ -3,7 +3,7 @@
 //! A [`Job`] is read once, from an OpenCue job file (CJSL 1.15), and checked whole: what Cuebot would
 //! refuse, and what it would take and misunderstand, is refused with line, column and remedy. A [`Plan`] is
 //! what of a job is to be done: its layers in the order of their dependences, their frames in chunks.
-//! [`run()`] carries a plan out here, one command after another; [`openjd`], [`slurm`] and [`opencue`] write
+//! [`run()`] carries a plan out here, one command after another; [`openjd()`], [`slurm()`] and [`opencue()`] write
 //! it down for a farm.
 //!
 //! This is no scheduler: nothing here knows of a second machine. It does not decide what is up to date

@@ -1,9 +1,10 @@
 //! A job as an Open Job Description template (`jobtemplate-2023-09`), in JSON.
 //!
-//! A layer is a step; what a layer waits for is a step's dependence, frame by frame or not, since steps depend
-//! as wholes. Frames are a `CHUNK[INT]` parameter, so the scheduler forms the chunks: of frames in rising order, of
-//! the layer's size or, to make them alike, a little less. Commands and environment come from [`shell`](super::shell). Memory and cores become
-//! host requirements. There are no retries: they are the scheduler's.
+//! A layer is a step. Steps depend as wholes, so what a layer waits for is a step's dependence, frame by
+//! frame or not. Frames are a `CHUNK[INT]` parameter, so the scheduler forms the chunks: of frames in
+//! rising order, of the layer's size or, to make them alike, a little less. Commands and environment come
+//! from [`shell`]; memory and cores become host requirements. There are no retries: they are the
+//! scheduler's.
 
 use super::plan::{Plan, PlannedLayer};
 use super::shell;
@@ -75,8 +76,8 @@ fn openjd_range(frames: &[i32]) -> String {
     super::range::format(frames).replace('x', ":")
 }
 
-/// A script in which `{{` and `}}`, which OpenJD would take for a reference, are broken up. They can stand in single
-/// quotes alone: in a command, a name or a value.
+/// A script in which `{{` and `}}`, which OpenJD would take for a reference, are broken up. They can stand
+/// in single quotes alone: in a command, a name or a value.
 fn without_braces(script: &str) -> String {
     // The second time is for three in a row.
     let apart = |script: &str| script.replace("{{", "{''{").replace("}}", "}''}");

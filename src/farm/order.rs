@@ -18,7 +18,7 @@ pub fn waits(layers: &[Layer], depends: &[Depend]) -> Vec<Vec<(usize, DependKind
     waits
 }
 
-/// The places of the layers such that each comes after all that it waits for, and otherwise in the file's order.
+/// The places of the layers: each comes after all that it waits for, and otherwise in the file's order.
 ///
 /// # Errors
 /// Layers that wait for each other in a ring; the last is the first again.

@@ -7,8 +7,8 @@ use super::plan::{Plan, PlannedLayer};
 use super::range;
 use std::fmt::Write;
 
-/// A script that carries out one chunk of a layer, the frames of which stand in the shell variable `frames`, as OpenCue
-/// writes them. Commands run in `root`.
+/// A script that carries out one chunk of a layer in the folder `root`. The chunk's frames stand in the shell
+/// variable `frames`, as OpenCue writes them.
 pub fn chunk(plan: &Plan, planned: &PlannedLayer, root: &str) -> String {
     let PlannedLayer { layer, frames, .. } = planned;
     let mut script = format!("cd {} || exit 1\n", quote(root));

@@ -1,10 +1,11 @@
 //! A job as a shell script that submits it to Slurm.
 //!
-//! A layer is a job array, a chunk a task of it. Slurm's indices end at 1,000 where nobody has raised `MaxArraySize`, so
-//! an index is none of a frame: each array has a table from index to frames, and a layer of more than 1,000
-//! chunks is several arrays. What a layer waits for becomes `--dependency=afterok`, frame by frame where both have the
-//! same chunks (`aftercorr`) and else as a whole. A layer whose predecessor fails is cancelled. Commands and
-//! environment come from [`shell`](super::shell). There are no retries: `scontrol requeue` makes them.
+//! A layer is a job array, a chunk a task of it. Slurm's indices end at 1,000 where nobody has raised
+//! `MaxArraySize`, so an index is none of a frame: each array has a table from index to frames, and a layer
+//! of more than 1,000 chunks is several arrays. What a layer waits for becomes `--dependency=afterok`, frame
+//! by frame where both have the same chunks (`aftercorr`) and else as a whole. A layer whose predecessor
+//! fails is cancelled. Commands and environment come from [`shell`]. There are no retries: `scontrol
+//! requeue` makes them.
 
 use super::job::DependKind;
 use super::plan::{Plan, PlannedLayer};

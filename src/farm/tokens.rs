@@ -32,8 +32,8 @@ pub fn expand<'a>(command: &str, value: impl Fn(&str) -> &'a str) -> String {
     TOKENS.iter().fold(command.into(), replace)
 }
 
-/// The first thing in a command that looks like a token, capitals between number signs, and is none: a slip, which
-/// a shell would take for a comment.
+/// The first thing in a command that looks like a token, capitals between number signs, and is none: a slip,
+/// which a shell would take for a comment.
 pub fn unknown(command: &str) -> Option<&str> {
     let mut rest = command;
     while let Some((_, inside)) = rest.split_once('#') {

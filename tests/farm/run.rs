@@ -56,6 +56,7 @@ fn commands_run_beside_the_pipelines() {
     let folder = Folder::with("");
     folder.write("shots/a/pipelines/x.xml", &text);
     folder.write("shots/b/x.xml", &text);
+    folder.write("shots/.venv/no_job.xml", "<table/>");
     std::fs::remove_file(folder.path(JOB)).unwrap();
     folder.ends("run shots", 0);
     for root in ["shots/a", "shots/b"] {
@@ -145,9 +146,11 @@ fn parts_of_a_job_are_chosen_by_layer_and_frame() {
 #[test]
 fn events_are_read_and_told_and_what_is_no_event_is_logged() {
     let command = r#"echo plain; echo '{"event":"up-to-date","frame":1,"output":"a.exr"}'; printf 'no end' >&2"#;
-    let folder = Folder::with(&job(&[("kept", command, "1", 1), ("new", "true", "1", 1)], &[]));
+    let made = r#"echo '{"event":"frame-done","frame":1,"seconds":1.5,"rays":1,"light_picks":1,"output":"b.exr"}'"#;
+    let folder = Folder::with(&job(&[("kept", command, "1", 1), ("new", made, "1", 1)], &[]));
     let told = folder.ends("run tested.xml", 0);
     assert!(told.out.contains("0001-kept: up to date\n"), "{told:#?}");
+    assert!(told.out.contains("  frame 1 in 1.5 s"), "{told:#?}");
     assert!(told.out.contains("2 of 2 tasks done, 1 of them up to date before"), "{told:#?}");
     let log = folder.read("out/logs/tested/0001-kept.rqlog");
     assert!(log.contains("\nplain\na.exr: up to date\nno end"), "{log}");
@@ -177,6 +180,16 @@ fn what_a_command_leaves_running_is_ended_with_it() {
     // It may be a zombie for a moment.
     let state = std::fs::read_to_string(is_there).unwrap_or_default();
     assert!(state.is_empty() || state.contains(") Z "), "{state}");
+}
+
+#[test]
+fn a_process_that_has_left_its_group_and_prints_for_ever_does_not_keep_the_run() {
+    let command = "setsid sh -c 'touch left; while test -e go; do echo x; sleep 0.01; done' & \
+                   while ! test -e left; do sleep 0.01; done";
+    let folder = Folder::with(&job(&[("left", command, "1", 1)], &[]));
+    folder.write("go", "");
+    folder.ends("run tested.xml", 0);
+    std::fs::remove_file(folder.path("go")).unwrap();
 }
 
 #[test]

@@ -15,11 +15,13 @@ use std::process::ExitCode;
 
 /// Carries out the jobs of a pipeline on this machine, layer by layer, chunk by chunk.
 ///
-/// A job file is an OpenCue job (CJSL 1.15). Its commands run by `sh`, in the folder that holds `pipelines/` if the
-/// file is in a folder of that name, else in its own. What is up to date the commands find out themselves, so to
-/// go on after a failure or Ctrl-C is to run the same again. docs/farms.md tells all.
+/// A job file is an OpenCue job (CJSL 1.15). Its commands are run by `sh`, in the folder that holds
+/// `pipelines/` if the file is in a folder of that name, else in its own. What is up to date the commands
+/// find out themselves, so to go on after a failure or Ctrl-C is to run the same again. docs/farms.md tells
+/// all.
 ///
-/// Exit codes: 0 all is done, 1 something failed, 2 usage or a job file that is refused, 128 + n ended by signal n.
+/// Exit codes: 0 all is done, 1 something failed, 2 usage or a job file that is refused, 128 + n ended by
+/// signal n.
 #[derive(Args)]
 pub struct Arguments {
     /// A job file, or a folder of them

@@ -5,7 +5,7 @@ use candelabra::farm::{Fault, Outcome, Plan, RunEvent, RunWatch, Task, range};
 use candelabra::page::Plain;
 use candelabra::pipeline::Event;
 use clap::ValueEnum;
-use indicatif::{MultiProgress, ProgressBar, ProgressStyle};
+use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressStyle};
 use serde_json::json;
 use std::fmt::Display as Show;
 use std::io::{self, IsTerminal, Write};
@@ -69,7 +69,10 @@ impl Display {
         Ok(Display {
             progress,
             signal,
-            bars: MultiProgress::new(),
+            bars: match progress {
+                Progress::Auto => MultiProgress::new(),
+                _ => MultiProgress::with_draw_target(ProgressDrawTarget::hidden()),
+            },
             layers: Vec::new(),
             all: layers.map(|planned| planned.frames.len()).sum(),
             ended: 0,
@@ -91,9 +94,6 @@ impl Display {
                 self.line(json!({"event": "job-started", "job": job, "layers": layers}))
             }
             _ => {}
-        }
-        if self.progress != Progress::Auto {
-            return;
         }
         let width = plan.layers.iter().map(|planned| planned.layer.name.len()).max().unwrap_or(0);
         let template = format!("{{prefix:{width}}} {{bar:30}} {{percent:>3}}% {{msg}}");
@@ -174,8 +174,8 @@ impl Display {
         self.heartbeat();
     }
 
-    /// Moves the bar of a layer.
-    fn show(&self, task: &Task, event: &Event) {
+    /// Moves the bar of a layer, or tells of a frame.
+    fn show(&mut self, task: &Task, event: &Event) {
         let Some(layer) = self.layers.get(task.layer) else { return };
         match event {
             Event::Progress { frame, .. } => {
@@ -184,6 +184,13 @@ impl Display {
                 layer.bar.set_message(format!("{frame}{left}"));
             }
             Event::Stage { name } => layer.bar.set_message(name.clone()),
+            Event::FrameDone { frame, seconds, .. } if self.progress == Progress::Plain => {
+                let left = layer.advance(self.part * task.frames.len() as f64);
+                self.line(format_args!("  frame {frame} in {seconds:.1} s, {left}"));
+            }
+            Event::FrameFailed { frame, why } if self.progress == Progress::Plain => {
+                self.line(format_args!("  frame {frame} failed: {why}"));
+            }
             _ => {}
         }
     }
@@ -194,7 +201,7 @@ impl Display {
                 "event": "task-failed", "task": task.name, "why": fault.to_string(), "again": true,
             })),
             Progress::None => {}
-            _ => eprintln!("{}: {}; once more", task.name, Plain(fault)),
+            _ => self.bars.suspend(|| eprintln!("{}: {}; once more", task.name, Plain(fault))),
         }
     }
 

@@ -6,8 +6,8 @@
 use super::Position;
 use super::Refusal;
 
-/// Name; the children in their order, `?` optional, `*` any number, `+` at least one, or `TEXT`; the attributes,
-/// `?` optional, with their values if these are listed.
+/// Name; the children in their order, `?` optional, `*` any number, `+` at least one, or `TEXT`; the
+/// attributes, `?` optional, with their values if these are listed.
 type Row = (&'static str, &'static str, &'static [(&'static str, &'static str)]);
 
 const TEXT: &str = "#text";

@@ -15,6 +15,8 @@ use std::time::{Duration, Instant};
 
 /// Between two looks at signals and clocks.
 const LOOK: Duration = Duration::from_millis(50);
+/// Signs of life that wait to be heard; a command that prints faster is slowed down.
+const SIGNS: usize = 1000;
 /// What a command has after the polite signal of a timeout.
 const GRACE: Duration = Duration::from_secs(10);
 /// How long the last words of a command that has ended are awaited.
@@ -81,7 +83,7 @@ pub fn run(
     // The writing ends in `command` would keep the pipe open.
     drop(command);
     let group = Group(Pid::from_child(&child));
-    let (sender, signs) = mpsc::channel();
+    let (sender, signs) = mpsc::sync_channel(SIGNS);
     thread::spawn(move || log::copy(output, log, &sender));
 
     let mut listener = Listener { task, watch, made: false, kept: false, lost: None };
@@ -93,8 +95,8 @@ pub fn run(
                 heard = Instant::now();
                 listener.hear(sign);
             }
-            // The command has closed its outputs and works on.
-            Err(RecvTimeoutError::Disconnected) => thread::sleep(LOOK),
+            // The command has closed its outputs: it is about to end, or works on in silence.
+            Err(RecvTimeoutError::Disconnected) => thread::sleep(LOOK / 10),
             Err(RecvTimeoutError::Timeout) => {}
         }
         if let Some(number) = listener.watch.take_signal() {
@@ -169,7 +171,10 @@ impl Listener<'_> {
     /// Hears the rest. A process that has left the group may keep the pipe open for ever.
     fn hear_out(&mut self, signs: &Receiver<Sign>) {
         let end = Instant::now() + LAST_WORDS;
-        while let Ok(sign) = signs.recv_timeout(end.saturating_duration_since(Instant::now())) {
+        while let left = end.saturating_duration_since(Instant::now())
+            && !left.is_zero()
+            && let Ok(sign) = signs.recv_timeout(left)
+        {
             self.hear(sign);
         }
     }

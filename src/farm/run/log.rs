@@ -4,7 +4,7 @@ use crate::pipeline::Event;
 use std::fs::{File, OpenOptions};
 use std::io::{self, BufRead, BufReader, PipeReader, Read, Write};
 use std::path::Path;
-use std::sync::mpsc::Sender;
+use std::sync::mpsc::SyncSender;
 
 /// Longer lines are taken in pieces.
 const LONGEST_LINE: u64 = 64 << 10;
@@ -29,7 +29,7 @@ pub enum Sign {
 
 /// Copies all that a command prints to its log, until it prints no more. A log that cannot be written stops
 /// neither the copying nor the command.
-pub fn copy(output: PipeReader, mut log: File, signs: &Sender<Sign>) {
+pub fn copy(output: PipeReader, mut log: File, signs: &SyncSender<Sign>) {
     let mut output = BufReader::new(output);
     let (mut line, mut percent, mut is_lost) = (Vec::new(), None, false);
     loop {

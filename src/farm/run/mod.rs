@@ -1,12 +1,12 @@
 //! Carrying out a plan on this machine: one command after another.
 //!
-//! A command is run by `sh -c` with OpenCue's environment, as RQD does, in the job's root. Its process group is
-//! its own; when the command ends, what it has left running in there is killed. All that it prints goes to the log
-//! of its task, `LOGS/JOB/1001-render.rqlog`; lines that are [`Event`]s are told to the [`RunWatch`] and logged in
-//! words. Commands use all cores themselves, so two at a time would gain nothing.
+//! A command is run by `sh -c` with OpenCue's environment, as RQD does, in the job's root. It has a process
+//! group of its own; when the command ends, what it has left running in there is killed. All that it prints
+//! goes to the log of its task, `LOGS/JOB/1001-render.rqlog`; lines that are [`Event`]s are told to the
+//! [`RunWatch`] and logged in words. Commands use all cores themselves, so two at a time would gain nothing.
 //!
-//! A task that fails does not stop those that do not wait for it. A signal is passed on to the command, and what
-//! it makes of that is awaited; a second one kills it. The clock is read for timeouts alone.
+//! A task that fails does not stop those that do not wait for it. A signal is passed on to the command, and
+//! what it makes of that is awaited; a second one kills it. The clock is read for timeouts alone.
 
 mod command;
 mod log;
