@@ -9,6 +9,7 @@ hardly any pixels, so that reading the scene and preparing its lights is what is
 
 import base64
 import json
+import multiprocessing
 import os
 import random
 import struct
@@ -88,7 +89,10 @@ def cost(command):
 
 def row(programs, folder, count, kind):
     shot, tree = folder / "shot.gltf", folder / "shot.ltree"
-    shot.write_text(scene(count, kind))
+    # In a process of its own: what a process has at its peak, those that it starts are said to have, too.
+    writing = multiprocessing.get_context("fork").Process(target=lambda: shot.write_text(scene(count, kind)))
+    writing.start()
+    writing.join()
     subprocess.run(
         [programs / "candelabra", "build", shot, "-o", tree, "--force"], check=True, stdout=subprocess.DEVNULL
     )
