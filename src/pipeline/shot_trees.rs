@@ -2,7 +2,7 @@
 //!
 //! A process looks at the frames that it is asked for, and at what stands still, once. From a file it takes
 //! what the file proves and the scene confirms, frame by frame. Without a file it builds the tree of the frame,
-//! and copies what stands still from the tree of the frame before: memory stays flat, however long the shot.
+//! and copies what stands still from the trees of the frame before: memory stays flat, however long the shot.
 //! Both ways give trees that sample alike, and have the same [digest](LightTree::digest_at).
 
 use super::agreement::Agreement;
@@ -20,23 +20,13 @@ use std::path::{Path, PathBuf};
 
 /// The light trees of a shot, frame after frame.
 pub struct ShotTrees<'a> {
-    scene: &'a Scene,
-    emitters: &'a Emitters,
     surveyor: Surveyor<'a>,
     source: Source<'a>,
 }
 
 enum Source<'a> {
-    File { file: TreeFile<'a>, is_still_checked: bool },
-    Built { lights: Vec<LightSummary>, last: Option<BuiltFrame> },
-}
-
-/// The trees of one frame, and of what stands still.
-struct BuiltFrame {
-    /// Of what changes; `None` if nothing does.
-    fingerprint: Option<[u8; 32]>,
-    number: i32,
-    tree: LightTree<AlignedBytes>,
+    File(CheckedFile<'a>),
+    Built(BuiltTrees),
 }
 
 /// A tree file to take the trees of a shot from.
@@ -57,22 +47,17 @@ impl<'a> ShotTrees<'a> {
     /// Takes trees from a file that was built from this scene. Surveys what stands still.
     ///
     /// # Errors
-    /// [`TreeError::Overflow`] if the scene has a light that no tree can hold;
-    /// [`TreeError::Contradicts`] if the file numbers emitters otherwise.
+    /// [`TreeError::Stale`] if what stands still has changed since; [`TreeError::Contradicts`] if the file
+    /// numbers emitters otherwise; [`TreeError::Overflow`] if the scene has a light that no tree can hold.
     pub fn of_file(
         scene: &'a Scene,
         emitters: &'a Emitters,
         file: TreeFile<'a>,
     ) -> Result<ShotTrees<'a>, TreeError> {
         let surveyor = Surveyor::new(scene, emitters)?;
-        let trees = ShotTrees {
-            scene,
-            emitters,
-            surveyor,
-            source: Source::File { file, is_still_checked: false },
-        };
-        trees.check_whole()?;
-        Ok(trees)
+        let file = CheckedFile { scene, emitters, file, is_still_checked: false, last: None };
+        file.check_whole(&surveyor)?;
+        Ok(ShotTrees { surveyor, source: Source::File(file) })
     }
 
     /// Builds trees. Surveys what stands still.
@@ -81,6 +66,146 @@ impl<'a> ShotTrees<'a> {
     /// [`TreeError::Overflow`] if the scene has a light that no tree can hold.
     pub fn built(scene: &'a Scene, emitters: &'a Emitters) -> Result<ShotTrees<'a>, TreeError> {
         let surveyor = Surveyor::new(scene, emitters)?;
+        Ok(ShotTrees { surveyor, source: Source::Built(BuiltTrees::over(emitters)) })
+    }
+
+    /// A file in which this frame can be sampled; other frames perhaps not.
+    ///
+    /// # Errors
+    /// [`TreeError::NoSuchFrame`] if a file was built without the frame; [`TreeError::Stale`],
+    /// [`TreeError::Broken`] or [`TreeError::Contradicts`] if what it has of the frame is not what the scene
+    /// gives; [`TreeError::Overflow`] if the frame has a light that no tree can hold.
+    pub fn for_frame(&mut self, frame: i32) -> Result<LightTree<&[u8]>, TreeError> {
+        match &mut self.source {
+            Source::File(file) => file.checked(&mut self.surveyor, frame),
+            Source::Built(trees) => trees.build(&mut self.surveyor, frame),
+        }
+    }
+
+    /// Makes sure that what was checked is what was sampled.
+    ///
+    /// # Errors
+    /// [`TreeError::Overwritten`] if somebody has written to the file since it was opened.
+    pub fn check_unwritten(&self) -> Result<(), TreeError> {
+        let Source::File(CheckedFile { file, .. }) = &self.source else { return Ok(()) };
+        match file.mapped.is_some_and(|mapped| !mapped.is_unchanged()) {
+            true => Err(TreeError::Overwritten { path: file.path.into() }),
+            false => Ok(()),
+        }
+    }
+
+    /// Length of the file in bytes, if there is one.
+    pub fn file_length(&self) -> Option<usize> {
+        match &self.source {
+            Source::File(checked) => Some(checked.file.tree.byte_length()),
+            Source::Built(_) => None,
+        }
+    }
+}
+
+/// A file, checked as frames are asked for.
+struct CheckedFile<'a> {
+    scene: &'a Scene,
+    emitters: &'a Emitters,
+    file: TreeFile<'a>,
+    is_still_checked: bool,
+    /// The frame that was checked last.
+    last: Option<i32>,
+}
+
+impl CheckedFile<'_> {
+    /// Refuses a file that is not one of this scene, whatever the frame.
+    fn check_whole(&self, surveyor: &Surveyor) -> Result<(), TreeError> {
+        let tree = &self.file.tree;
+        let prints = tree.frames().iter().zip(tree.fingerprints());
+        let prints = prints.map(|(row, fingerprint)| (row.frame, *fingerprint));
+        if fingerprint::of_shot(&surveyor.still_fingerprint, prints) != tree.fingerprint() {
+            return Err(self.stale()?);
+        }
+        let TreeFile { path, forced, .. } = self.file;
+        match self.agreement(surveyor, &[]).of_numbering(self.emitters) {
+            Some(cause) => Err(contradicts(tree, path, self.scene, forced, cause)),
+            None => Ok(()),
+        }
+    }
+
+    /// The file, after what it has of a frame has been checked.
+    fn checked(
+        &mut self,
+        surveyor: &mut Surveyor,
+        number: i32,
+    ) -> Result<LightTree<&[u8]>, TreeError> {
+        if self.last == Some(number) {
+            return Ok(self.file.tree.by_reference());
+        }
+        let frame = self.fresh(surveyor, number)?;
+        if self.file.verify {
+            let TreeFile { tree, path, forced, .. } = &self.file;
+            tree.verify_frame(number)
+                .map_err(|cause| TreeError::Broken { path: (*path).into(), cause })?;
+            let agreement = self.agreement(surveyor, frame.as_slice());
+            let still = match self.is_still_checked {
+                true => None,
+                false => agreement.of_shared().or_else(|| agreement.of_still()),
+            };
+            let of_frame = || agreement.of_frame(frame.as_ref()?);
+            if let Some(cause) = still.or_else(of_frame) {
+                return Err(contradicts(tree, path, self.scene, forced, cause));
+            }
+            self.is_still_checked = true;
+        }
+        surveyor.forget_still();
+        self.last = Some(number);
+        Ok(self.file.tree.by_reference())
+    }
+
+    /// What changes, in a frame of which the file has the fingerprint; `None` if nothing changes.
+    fn fresh(
+        &self,
+        surveyor: &mut Surveyor,
+        number: i32,
+    ) -> Result<Option<SurveyedFrame>, TreeError> {
+        if !surveyor.is_changing() {
+            return Ok(None);
+        }
+        let TreeFile { tree, path, .. } = &self.file;
+        tree.roots_at(number)
+            .map_err(|cause| TreeError::NoSuchFrame { path: (*path).into(), cause })?;
+        let told = tree.row_of(number).and_then(|row| tree.fingerprints().get(row));
+        let frame = surveyor.frame_alone(number)?;
+        match told == Some(&frame.fingerprint) {
+            true => Ok(Some(frame)),
+            false => Err(self.stale()?),
+        }
+    }
+
+    fn stale(&self) -> Result<TreeError, TreeError> {
+        let TreeFile { tree, path, forced, .. } = &self.file;
+        stale(tree, path, self.scene, self.emitters, forced)
+    }
+
+    fn agreement<'s>(
+        &'s self,
+        surveyor: &'s Surveyor,
+        frames: &'s [SurveyedFrame],
+    ) -> Agreement<'s, &'s [u8]> {
+        let Surveyor { shared, lasting, still, .. } = surveyor;
+        let changing = frames.iter().map(|frame| &*frame.group).collect();
+        Agreement { tree: &self.file.tree, shared, lasting: *lasting, still, changing }
+    }
+}
+
+/// Trees, built as frames are asked for.
+struct BuiltTrees {
+    /// One for each class.
+    lights: Vec<LightSummary>,
+    /// The frame that was last asked for, and its trees.
+    last: Option<(i32, LightTree<AlignedBytes>)>,
+}
+
+impl BuiltTrees {
+    /// Over some emitters; none is built yet.
+    fn over(emitters: &Emitters) -> BuiltTrees {
         // Sampling asks where the emitters of a class begin, and not which lights they are.
         let class = |lights: &[LightEntry]| LightSummary {
             path: String::new(),
@@ -91,148 +216,42 @@ impl<'a> ShotTrees<'a> {
             look: LightLook::default(),
         };
         let classes = emitters.lights().chunk_by(|a, b| class_of(a) == class_of(b));
-        let lights = classes.map(class).collect();
-        let source = Source::Built { lights, last: None };
-        Ok(ShotTrees { scene, emitters, surveyor, source })
+        BuiltTrees { lights: classes.map(class).collect(), last: None }
     }
 
-    /// A file in which a frame can be sampled; other frames perhaps not.
-    ///
-    /// # Errors
-    /// [`TreeError::NoSuchFrame`] if a file was built without the frame; [`TreeError::Stale`],
-    /// [`TreeError::Broken`] or [`TreeError::Contradicts`] if what it has of the frame is not what the scene
-    /// gives; [`TreeError::Overflow`] if the frame has a light that no tree can hold.
-    pub fn for_frame(&mut self, frame: i32) -> Result<LightTree<&[u8]>, TreeError> {
-        self.surveyor.shared.truncate(self.surveyor.lasting);
-        match self.source {
-            Source::File { .. } => self.check(frame)?,
-            Source::Built { .. } => self.build(frame)?,
+    /// The trees of a frame, built if those of the last one will not do.
+    fn build(
+        &mut self,
+        surveyor: &mut Surveyor,
+        number: i32,
+    ) -> Result<LightTree<&[u8]>, TreeError> {
+        let will_do = |(last, _): &(i32, _)| *last == number || !surveyor.is_changing();
+        if !self.last.as_ref().is_some_and(will_do) {
+            self.last = Some((number, self.built(surveyor, number)?));
+            surveyor.forget_still();
         }
-        match &self.source {
-            Source::File { file, .. } => Ok(file.tree.by_reference()),
-            Source::Built { last, .. } => {
-                Ok(last.as_ref().expect("it was just built").tree.by_reference())
-            }
-        }
+        let (_, tree) = self.last.as_ref().expect("it is built");
+        Ok(tree.by_reference())
     }
 
-    /// Makes sure that what was checked is what was sampled.
-    ///
-    /// # Errors
-    /// [`TreeError::Overwritten`] if somebody has written to the file since it was opened.
-    pub fn check_unwritten(&self) -> Result<(), TreeError> {
-        match &self.source {
-            Source::File { file: TreeFile { path, mapped: Some(mapped), .. }, .. }
-                if !mapped.is_unchanged() =>
-            {
-                Err(TreeError::Overwritten { path: (*path).into() })
-            }
-            _ => Ok(()),
-        }
-    }
-
-    /// Length of the file in bytes, if there is one.
-    pub fn file_length(&self) -> Option<usize> {
-        match &self.source {
-            Source::File { file, .. } => Some(file.tree.byte_length()),
-            Source::Built { .. } => None,
-        }
-    }
-
-    /// Refuses a file that is not one of this scene, whatever the frame.
-    fn check_whole(&self) -> Result<(), TreeError> {
-        let Source::File { file, .. } = &self.source else { return Ok(()) };
-        let TreeFile { tree, path, forced, .. } = file;
-        let prints = tree.frames().iter().zip(tree.fingerprints());
-        let prints = prints.map(|(row, fingerprint)| (row.frame, *fingerprint));
-        let fingerprint = fingerprint::of_shot(&self.surveyor.still_fingerprint, prints);
-        if fingerprint != tree.fingerprint() {
-            return Err(stale(tree, path, self.scene, self.emitters, forced)?);
-        }
-        match self.agreement(&[]).of_numbering(self.emitters) {
-            Some(cause) => Err(contradicts(tree, path, self.scene, forced, cause)),
-            None => Ok(()),
-        }
-    }
-
-    /// Checks what a file has of a frame.
-    fn check(&mut self, number: i32) -> Result<(), TreeError> {
-        let changing = self.surveyor.is_changing();
-        let Source::File { file, is_still_checked } = &self.source else { return Ok(()) };
-        let TreeFile { tree, path, forced, verify, .. } = file;
-        let broken = |cause| TreeError::Broken { path: (*path).into(), cause };
-        let mut frame = None;
-        if changing {
-            let told = tree.row_of(number).and_then(|row| tree.fingerprints().get(row));
-            let Some(told) = told else {
-                tree.roots_at(number)
-                    .map_err(|cause| TreeError::NoSuchFrame { path: (*path).into(), cause })?;
-                return Err(stale(tree, path, self.scene, self.emitters, forced)?);
-            };
-            let surveyed = self.surveyor.frame(number)?;
-            if surveyed.fingerprint != *told {
-                return Err(stale(tree, path, self.scene, self.emitters, forced)?);
-            }
-            frame = Some(surveyed);
-        }
-        if !verify {
-            self.surveyor.forget_still();
-            return Ok(());
-        }
-        tree.verify_frame(number).map_err(broken)?;
-        let agreement = self.agreement(frame.as_slice());
-        let still = || match is_still_checked {
-            true => None,
-            false => agreement.of_shared().or_else(|| agreement.of_still()),
-        };
-        let of_frame = || frame.as_ref().and_then(|frame| agreement.of_frame(frame));
-        if let Some(cause) = still().or_else(of_frame) {
-            return Err(contradicts(tree, path, self.scene, forced, cause));
-        }
-        if let Source::File { is_still_checked, .. } = &mut self.source {
-            *is_still_checked = true;
-        }
-        self.surveyor.forget_still();
-        Ok(())
-    }
-
-    fn agreement<'s>(&'s self, frames: &'s [SurveyedFrame]) -> Agreement<'s, &'a [u8]> {
-        let Source::File { file, .. } = &self.source else {
-            unreachable!("only files are compared")
-        };
-        let Surveyor { shared, lasting, still, .. } = &self.surveyor;
-        let changing = frames.iter().map(|frame| &*frame.group).collect();
-        Agreement { tree: &file.tree, shared, lasting: *lasting, still, changing }
-    }
-
-    /// Builds the trees of a frame, if those that are there are not the same.
-    fn build(&mut self, number: i32) -> Result<(), TreeError> {
-        let Source::Built { lights, last } = &mut self.source else { return Ok(()) };
-        let frame = match self.surveyor.is_changing() {
-            true => Some(self.surveyor.frame(number)?),
+    fn built(
+        &self,
+        surveyor: &mut Surveyor,
+        number: i32,
+    ) -> Result<LightTree<AlignedBytes>, TreeError> {
+        let frame = match surveyor.is_changing() {
+            true => Some(surveyor.frame_alone(number)?),
             false => None,
         };
-        let fingerprint = frame.as_ref().map(|frame| frame.fingerprint);
-        let is_same = |last: &BuiltFrame| match fingerprint {
-            Some(_) => last.fingerprint == fingerprint && last.number == number,
-            None => true,
-        };
-        if last.as_ref().is_some_and(is_same) {
-            return Ok(());
-        }
-        let earlier = last.as_ref().map(|last| &last.tree);
-        let bytes = build_frame(&self.surveyor, frame.as_slice(), lights, earlier);
+        let earlier = self.last.as_ref().map(|(_, tree)| tree);
+        let bytes = build_frame(surveyor, frame.as_slice(), &self.lights, earlier);
         let tree = LightTree::open(bytes).expect("what was just built can be opened");
         if let Some(earlier) = earlier {
-            let stills = tree.still_tree().zip(earlier.still_tree());
-            tree.know_digests(
-                earlier,
-                (0..self.surveyor.lasting as u32).map(|row| (row, row)).chain(stills),
-            );
+            let lasting = (0..surveyor.lasting as u32).map(|row| (row, row));
+            let still = tree.still_tree().zip(earlier.still_tree());
+            tree.know_digests(earlier, lasting.chain(still));
         }
-        *last = Some(BuiltFrame { fingerprint, number, tree });
-        self.surveyor.forget_still();
-        Ok(())
+        Ok(tree)
     }
 }
 

@@ -81,6 +81,15 @@ impl<'a> Surveyor<'a> {
         Ok(SurveyedFrame { number, group: Arc::new(group), fingerprint })
     }
 
+    /// The same for who looks at one frame at a time: the forced lights of the frame before are let go of.
+    ///
+    /// # Errors
+    /// A light that is too far away or too strong for `f32`.
+    pub fn frame_alone(&mut self, number: i32) -> Result<SurveyedFrame, LightOverflow> {
+        self.shared.truncate(self.lasting);
+        self.frame(number)
+    }
+
     /// Lets go of the bounds that stand still, once their tree is built or compared.
     pub fn forget_still(&mut self) {
         self.still.flat = Vec::new();

@@ -1,9 +1,12 @@
 //! `candelabra build` and `candelabra inspect`.
 
 use crate::files::{SCENE, Shot, base64};
+use candelabra::pipeline::{BuildError, BuildJob, Event, Watch};
 use serde_json::json;
 use std::io::Read;
 use std::process::{Command, Stdio};
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 #[test]
 fn a_scene_becomes_a_tree_beside_it() {
@@ -41,6 +44,55 @@ fn a_tree_that_is_up_to_date_is_left_alone() {
     shot.edit(|json| json["nodes"][1]["translation"] = json!([0, 0, 2]));
     shot.candelabra(&build).ends(0).keeps_quiet_about("up to date");
     assert_ne!(shot.read("deep/er/it.ltree"), whole);
+}
+
+/// Wants a job to stop when it asks for the last time but so many.
+struct Impatient {
+    left: AtomicUsize,
+    stages: Mutex<Vec<String>>,
+}
+
+impl Watch for Impatient {
+    fn tell(&self, event: Event) {
+        if let Event::Stage { name } = event {
+            self.stages.lock().unwrap().push(name);
+        }
+    }
+
+    fn is_stopped(&self) -> bool {
+        let less = |left: usize| left.checked_sub(1);
+        self.left.fetch_update(Ordering::Relaxed, Ordering::Relaxed, less).is_err()
+    }
+}
+
+/// Wherever a job is stopped, the file is whole or not there.
+#[test]
+fn a_job_stops_between_its_stages() {
+    let shot = Shot::moving();
+    let job = BuildJob { scene: shot.path(SCENE), ..BuildJob::default() };
+    for asked in 0.. {
+        let watch = Impatient { left: AtomicUsize::new(asked), stages: Mutex::default() };
+        let done = job.run(&watch);
+        let stages = watch.stages.into_inner().unwrap();
+        assert!(stages.len() >= asked.min(5), "{stages:?}");
+        match done {
+            Err(error) => {
+                assert!(matches!(error, BuildError::Stopped), "{error}");
+                assert!(asked < 5 && stages.len() == asked, "{stages:?}");
+                assert_eq!(shot.names(), [SCENE]);
+            }
+            Ok(report) => {
+                assert_eq!((asked, shot.names()), (5, vec![SCENE.into(), "shot.ltree".into()]));
+                // Who has no time is not told what the file saves.
+                assert!(report.built.unwrap().break_even.is_none());
+                break;
+            }
+        }
+    }
+    let again = job.run(&()).unwrap();
+    assert!(again.built.is_none(), "it is up to date");
+    let forced = BuildJob { force: true, ..job }.run(&()).unwrap();
+    assert!(forced.built.unwrap().break_even.is_some());
 }
 
 /// So many point lights in a row.
