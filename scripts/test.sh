@@ -1,6 +1,6 @@
 #!/bin/sh
-# Every check: format, lints, documentation, the Rust tests, the exporter's tests, the pages in a
-# browser (if there is a Chromium).
+# Every check: format, lints, documentation, the Rust tests, the exporter's tests, the farms (Slurm if it
+# is installed), the pages in a browser (if there is a Chromium).
 #
 # Tests that read the scenes of other people look for them in ../shared, or where CANDELABRA_SHARED
 # points, and are skipped if they are not there.
@@ -19,6 +19,10 @@ cargo test --quiet
 echo "== exporter"
 environment scripts/requirements.txt scripts/requirements-test.txt
 "$python" -m pytest --quiet tests/exporter
+echo "== farms"
+# RQD's own dependences are for desktops.
+"$python" -m pip install --quiet --disable-pip-version-check --no-deps opencue_rqd==1.37.0
+"$python" -m pytest --quiet -rs tests/farm
 echo "== pages"
 "$python" -m pytest --quiet -rs tests/pages
 echo "all checks pass"

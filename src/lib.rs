@@ -14,7 +14,7 @@
 //! | floor | rooms | |
 //! |---|---|---|
 //! | 7 | `bin/candelabra`, `bin/candelabra-render` | arguments, progress, exit codes |
-//! | 6 | [`diff`], [`inspect`] | what changed between two versions of a scene; what is in one |
+//! | 6 | [`diff`], [`farm`], [`inspect`] | what changed between two versions of a scene; jobs of many frames; what is in a scene |
 //! | 5 | [`pipeline`] | jobs and stages: the only place where ingest meets the tree |
 //! | 4 | [`measure`] | strategies side by side: exact variance, error against time |
 //! | 3 | [`render`] | a path tracer that finds its lights through the tree |
@@ -44,8 +44,7 @@
 //!
 //! // The same type over bytes just built and over a mapped file (`pipeline::open_tree`).
 //! let tree = LightTree::open(bytes)?;
-//! let leaves = tree.leaf_table();
-//! let frame = tree.at_frame(1001, &leaves)?;
+//! let frame = tree.at_frame(1001)?;
 //! let receiver = Receiver { point: Vec3::ZERO, normal: Vec3::Y };
 //! if let Some(pick) = frame.sample(&receiver, 0.25) {
 //!     assert!(pick.probability > 0.0);
@@ -59,6 +58,7 @@
 pub mod bounds;
 pub mod diff;
 pub mod emitter;
+pub mod farm;
 pub mod ingest;
 pub mod inspect;
 pub mod light_tree;

@@ -12,7 +12,7 @@ const FLOORS: [&[&str]; 8] = [
     &["render"],
     &["measure"],
     &["pipeline"],
-    &["diff", "inspect"],
+    &["diff", "farm", "inspect"],
     &["bin"],
 ];
 

@@ -15,7 +15,7 @@ from pathlib import Path
 from pxr import Tf, UsdUtils
 
 from .export import export
-from .gltf_document import write_atomically
+from .whole_file import write_atomically
 from .report import CATEGORIES, ExportError
 from .source_hash import recorded_hash, up_to_date
 from .stage import Options, first_line

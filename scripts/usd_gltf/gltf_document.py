@@ -11,12 +11,12 @@ import json
 import os
 import re
 import struct
-import tempfile
 from pathlib import Path
 
 import numpy as np
 
 from .report import ExportError
+from .whole_file import write_atomically
 
 FLOAT, UINT32, UINT16 = 5126, 5125, 5123
 ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER = 34962, 34963
@@ -32,24 +32,6 @@ def number(value: float) -> float:
 def numbers(values) -> list[float]:
     """A list of `number`s."""
     return [number(v) for v in values]
-
-
-def write_atomically(path: Path, data: bytes) -> None:
-    """Write to a temporary file in the same folder, then rename."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    handle, temporary = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
-    try:
-        with os.fdopen(handle, "wb") as file:
-            file.write(data)
-            file.flush()
-            os.fsync(file.fileno())
-        mask = os.umask(0)
-        os.umask(mask)
-        os.chmod(temporary, 0o666 & ~mask)
-        os.replace(temporary, path)
-    except BaseException:
-        os.unlink(temporary)
-        raise
 
 
 class Document:

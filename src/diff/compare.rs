@@ -174,12 +174,11 @@ fn compare_picking(
     let scenes = sides.map(Surveyed::scene);
     let (places, probes) = probes(scenes, trees);
     let before: Vec<u32> = (0..lights[0].len() as u32).collect();
-    let tables = trees.map(LightTree::leaf_table);
     let both_scenes = scenes.iter().all(Option::is_some);
     let beside = scenes.map(|scene| scene.filter(|_| both_scenes));
     let picks = [
-        Picks::new(trees[0], &tables[0], beside[0], &before),
-        Picks::new(trees[1], &tables[1], beside[1], &pairs.number_of_after),
+        Picks::new(trees[0], beside[0], &before),
+        Picks::new(trees[1], beside[1], &pairs.number_of_after),
     ];
     let (change, moved) = picking_change([&picks[0], &picks[1]], pairs.count, places, &probes);
     (Some(change), moved)

@@ -63,8 +63,8 @@ pub(super) fn map<D: AsRef<[u8]> + Sync>(
     let settings = RenderSettings { width, height, ..Default::default() };
     let picture = |side: usize, camera| {
         let SceneSide { scene, emitters, .. } = sides[side];
-        let delegate = RenderDelegate::new(scene, emitters, trees[side], camera, settings.clone());
-        direct_light(&delegate, sides[side].frame(), shadows).ok()
+        let delegate = RenderDelegate::new(scene, emitters, camera, settings.clone());
+        direct_light(&delegate, trees[side], sides[side].frame(), shadows).ok()
     };
     let (before, after) = (picture(0, before)?, picture(1, after)?);
     let cell = |(before, after): (&Option<f32>, &Option<f32>)| {

@@ -10,7 +10,7 @@
 
 use super::scene_side::SceneSide;
 use crate::emitter::InfiniteLight;
-use crate::light_tree::{FrameTree, LeafTable, LightTree, Receiver};
+use crate::light_tree::{FrameTree, LightTree, Receiver};
 use rayon::prelude::*;
 use serde::Serialize;
 
@@ -54,7 +54,6 @@ impl<'a> Picks<'a> {
     /// of `scene` compete with the tree, if a scene is given.
     pub fn new<D: AsRef<[u8]>>(
         tree: &'a LightTree<D>,
-        table: &'a LeafTable,
         scene: Option<&'a SceneSide>,
         numbers: &[u32],
     ) -> Picks<'a> {
@@ -63,7 +62,7 @@ impl<'a> Picks<'a> {
         let light_of_emitter = near
             .flat_map(|(light, &number)| std::iter::repeat_n(number, light.emitter_count as usize));
         Picks {
-            frame: tree.at_frame(frame, table).expect("a file has its first frame"),
+            frame: tree.at_frame(frame).expect("a file has its first frame"),
             light_of_emitter: light_of_emitter.collect(),
             infinite: scene.map_or_else(Vec::new, |scene| {
                 scene.infinite_to_pick(&numbers[tree.lights().len()..])

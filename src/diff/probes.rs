@@ -21,8 +21,8 @@ pub(super) fn on_camera_paths<D: AsRef<[u8]> + Sync>(
 ) -> Option<Vec<Receiver>> {
     let camera = side.camera?.clone();
     let settings = RenderSettings { width: PICTURE, height: PICTURE, ..Default::default() };
-    let delegate = RenderDelegate::new(side.scene, &side.emitters, tree, camera, settings);
-    let found = delegate.at_frame(side.frame(), |integrator| {
+    let delegate = RenderDelegate::new(side.scene, &side.emitters, camera, settings);
+    let found = delegate.at_frame(tree, side.frame(), |integrator| {
         (0..PROBES).filter_map(|i| visited(integrator, i, PROBES, 0)).map(|v| v.receiver).collect()
     });
     found.ok().filter(|found: &Vec<Receiver>| !found.is_empty())

@@ -32,7 +32,7 @@ mod uri;
 
 pub use error::IngestError;
 
-use crate::scene::Scene;
+use crate::scene::{Scene, SourceFile};
 use crate::store::read_regular;
 use error::Fault;
 use std::path::Path;
@@ -66,9 +66,11 @@ pub fn load(path: &Path) -> Result<Scene, IngestError> {
 /// times as much memory.
 const MOST_FILE_BYTES: u64 = 4 << 30;
 
-/// The bytes of the scene file itself.
-fn read_file(path: &Path) -> Result<Vec<u8>, Fault> {
-    read_regular(path, MOST_FILE_BYTES).map_err(|error| {
+/// The bytes of the scene file itself, and a record of them.
+fn read_file(path: &Path) -> Result<(Vec<u8>, SourceFile), Fault> {
+    let bytes = read_regular(path, MOST_FILE_BYTES).map_err(|error| {
         Fault::new("file", format!("cannot be read: {error}")).remedy("check the path")
-    })
+    })?;
+    let read = SourceFile::new(path.to_path_buf(), &bytes);
+    Ok((bytes, read))
 }

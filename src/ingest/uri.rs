@@ -2,6 +2,7 @@
 
 use super::MOST_FILE_BYTES;
 use super::error::Fault;
+use crate::scene::SourceFile;
 use crate::store::read_regular;
 use std::collections::BTreeSet;
 use std::fs;
@@ -11,7 +12,7 @@ use std::sync::{Mutex, PoisonError};
 /// The folder that a scene may read from: the one its file stands in. Remembers what was read.
 pub(super) struct Folder {
     path: PathBuf,
-    files: Mutex<BTreeSet<PathBuf>>,
+    files: Mutex<BTreeSet<SourceFile>>,
 }
 
 impl Folder {
@@ -28,9 +29,9 @@ impl Folder {
     }
 
     /// The scene's file and all files that were read through this folder.
-    pub(super) fn into_files(self, scene: &Path) -> Vec<PathBuf> {
+    pub(super) fn into_files(self, scene: SourceFile) -> Vec<SourceFile> {
         let read = self.files.into_inner().unwrap_or_else(PoisonError::into_inner);
-        std::iter::once(scene.to_path_buf()).chain(read).collect()
+        std::iter::once(scene).chain(read).collect()
     }
 
     /// The bytes of the file that a glTF URI names, or of the `data:` URI itself.
@@ -92,11 +93,13 @@ impl Folder {
     }
 
     pub(super) fn read(&self, file: &Path, object: &str) -> Result<Vec<u8>, Fault> {
-        self.files.lock().unwrap_or_else(PoisonError::into_inner).insert(file.to_path_buf());
-        read_regular(file, MOST_FILE_BYTES).map_err(|error| {
+        let bytes = read_regular(file, MOST_FILE_BYTES).map_err(|error| {
             let problem = format!("{} cannot be read: {error}", file.display());
             Fault::new(object, problem).remedy("check the file and its permissions")
-        })
+        })?;
+        let read = SourceFile::new(file.to_path_buf(), &bytes);
+        self.files.lock().unwrap_or_else(PoisonError::into_inner).insert(read);
+        Ok(bytes)
     }
 }
 

@@ -106,7 +106,7 @@ impl<'a> Base<'a> {
         leaf: impl Fn(usize) -> Leaf + Sync,
     ) -> Option<Earlier<'_>> {
         let row = self.tree.frames().get(frame)?.tree;
-        let is_own = kind_of(&self.tree, row) == Some(TreeKind::Frame) && !self.is_copy(row);
+        let is_own = kind_of(&self.tree, row) == Some(TreeKind::Frame);
         let first = |class| self.tree.first_of_class(class);
         let own = first(LightRow::CHANGES)..first(LightRow::CHANGES | LightRow::PLACED);
         is_own.then(|| self.earlier(&self.tree.trees()[row as usize], own, bounds, leaf))
@@ -114,19 +114,6 @@ impl<'a> Base<'a> {
 
     fn still_row(&self) -> Option<&TreeRow> {
         self.tree.still_tree().map(|row| &self.tree.trees()[row as usize])
-    }
-
-    /// Whether the tree of a frame differs from the tree before it in energies alone. Then its clusters
-    /// may be a copy of that tree's, instead of those that a build would give.
-    fn is_copy(&self, row: u32) -> bool {
-        let [before, own] =
-            [row.wrapping_sub(1), row].map(|row| self.tree.trees().get(row as usize));
-        let (Some(before), Some(own)) = (before, own) else { return false };
-        let dull = |row| {
-            let nodes = self.tree.groups_of(row).iter().flat_map(Group::nodes);
-            nodes.map(|node| bytemuck::cast::<Node, [u8; 32]>(node.with_energy(1.0)))
-        };
-        before.kind == own.kind && dull(before).eq(dull(own))
     }
 
     fn earlier(

@@ -99,10 +99,6 @@ impl Group {
         self.link[lane] = node.link;
     }
 
-    pub(super) fn set_energy(&mut self, lane: usize, energy: f32) {
-        self.energy[lane] = energy;
-    }
-
     pub(super) fn set_link(&mut self, lane: usize, link: Link) {
         self.link[lane] = link.encode();
     }

@@ -15,9 +15,9 @@ pub(super) type Slot = u32;
 const NO_SLOT: Slot = u32::MAX;
 
 /// Where the leaves are of all emitters that stand still or are in shared trees.
-/// [`LightTree::leaf_table`] makes it once for a shot.
+/// Made once for an open file.
 #[derive(Clone, Debug, Default)]
-pub struct LeafTable {
+pub(super) struct LeafTable {
     /// Of what stands still.
     still: Leaves,
     /// For each tree that is shared, the slot of each of its own emitters.
@@ -54,8 +54,12 @@ pub(super) struct Route {
 }
 
 impl<D: AsRef<[u8]>> LightTree<D> {
-    /// Finds the leaves of all emitters that stand still or are in shared trees.
-    pub fn leaf_table(&self) -> LeafTable {
+    /// The leaves of all emitters that stand still or are in shared trees.
+    pub(super) fn leaf_table(&self) -> &LeafTable {
+        self.known().leaves.get_or_init(|| self.find_leaves())
+    }
+
+    fn find_leaves(&self) -> LeafTable {
         let trees = self.trees();
         let of_kind = |kind| move |tree: &&TreeRow| TreeKind::of(tree) == Some(kind);
         let shared = trees.iter().take_while(of_kind(TreeKind::Shared)).map(|tree| {

@@ -23,14 +23,18 @@
 //! | `picks` | picking those, and how often each light is expected to be |
 //! | `leaves`, `probability` | the way back from an emitter to its probability |
 //! | `variance` | how far off an estimate is, in closed form |
-//! | `verify` | proof that a file keeps the format's promises |
+//! | `verify` | proof that a file, or what a frame samples of it, keeps the format's promises |
+//! | `digest` | what a frame samples, in 32 bytes |
+//! | `known` | what has been found out about a file |
 
 mod base;
 mod builder;
 mod cut;
+mod digest;
 mod glossy;
 mod group;
 mod importance;
+mod known;
 mod leaves;
 mod node;
 mod picks;
@@ -52,10 +56,9 @@ pub use builder::ALGORITHM_VERSION;
 pub use cut::{Picked, Scratch};
 pub use glossy::{Glossy, Lobes};
 pub use group::{Group, WIDTH};
-pub use leaves::LeafTable;
 pub use node::{Link, Node};
 pub use records::{
-    FrameRow, InstanceRow, LightLook, LightRow, MeanRow, TextureRow, TreeKind, TreeRow,
+    FrameRow, InstanceRow, LightLook, LightRow, MeanRow, Numbering, TextureRow, TreeKind, TreeRow,
 };
 pub use sampling::{FrameTree, Pick};
 pub use segment::Segment;

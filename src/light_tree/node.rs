@@ -145,10 +145,6 @@ impl Node {
         self.energy
     }
 
-    pub(super) fn with_energy(self, energy: f32) -> Node {
-        Node { energy, ..self }
-    }
-
     /// Decoded for the importance.
     pub(super) fn cluster(&self) -> Cluster {
         Cluster {

@@ -11,13 +11,14 @@ pub const TREES: SectionId = SectionId(*b"TREE");
 pub const GROUPS: SectionId = SectionId(*b"GRUP");
 pub const INSTANCES: SectionId = SectionId(*b"INST");
 pub const FRAMES: SectionId = SectionId(*b"FRAM");
+pub const FINGERPRINTS: SectionId = SectionId(*b"FPRT");
 pub const FORCED: SectionId = SectionId(*b"FORC");
 pub const LIGHTS: SectionId = SectionId(*b"LGHT");
 pub const PATHS: SectionId = SectionId(*b"PATH");
 pub const TEXTURES: SectionId = SectionId(*b"TXTR");
 pub const MEANS: SectionId = SectionId(*b"MEAN");
-pub const ALL: [SectionId; 10] =
-    [META, TREES, GROUPS, INSTANCES, FRAMES, FORCED, LIGHTS, PATHS, TEXTURES, MEANS];
+pub const ALL: [SectionId; 11] =
+    [META, TREES, GROUPS, INSTANCES, FRAMES, FINGERPRINTS, FORCED, LIGHTS, PATHS, TEXTURES, MEANS];
 
 /// One tree of a file.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
@@ -83,6 +84,16 @@ pub struct FrameRow {
     pub first_forced: u32,
     /// How many forced lights it has.
     pub forced_count: u32,
+}
+
+/// Where the kinds of emitters begin, which are numbered one after the other.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
+#[repr(C)]
+pub struct Numbering {
+    /// The first emitter of a light of class 1, 2, 3 and 4, or beyond.
+    pub first_of_class: [u32; 4],
+    /// How many emitters there are.
+    pub count: u32,
 }
 
 /// The tree of a frame in which nothing shines.

@@ -51,11 +51,7 @@ impl<D: AsRef<[u8]>> LightTree<D> {
     ///
     /// # Errors
     /// [`NoSuchFrame`] if lights change and the file was built without this frame.
-    pub fn at_frame<'a>(
-        &'a self,
-        frame: i32,
-        table: &'a LeafTable,
-    ) -> Result<FrameTree<'a>, NoSuchFrame> {
+    pub fn at_frame(&self, frame: i32) -> Result<FrameTree<'_>, NoSuchFrame> {
         let (root, forced) = self.roots_at(frame)?;
         let root = root.filter(|&row| (row as usize) < self.trees().len());
         let changing = self.first_of_class(LightRow::CHANGES);
@@ -71,7 +67,7 @@ impl<D: AsRef<[u8]>> LightTree<D> {
             trees: self.trees(),
             instances: self.instances(),
             root,
-            table,
+            table: self.leaf_table(),
             own,
             forced: forced.collect(),
             emitter_count: self.emitter_count() as u32,

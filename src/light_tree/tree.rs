@@ -1,32 +1,36 @@
 //! An open light tree file. One type serves bytes that were just built and bytes mapped from a file.
 
-use super::group::Group;
+use super::group::{Group, WIDTH};
+use super::known::{Known, OfTree};
+use super::node::Link;
 use super::records::{
-    self, FrameRow, InstanceRow, LightRow, MeanRow, NO_TREE, TextureRow, TreeKind, TreeRow,
+    self, FrameRow, InstanceRow, LightRow, MeanRow, NO_TREE, Numbering, TextureRow, TreeKind,
+    TreeRow,
 };
 use crate::store::{self, Container, Section, SectionId, StoreError};
 use bytemuck::Pod;
 use std::ops::Range;
-use std::sync::OnceLock;
+use std::sync::Arc;
 
 /// The light trees of a shot, viewed in the bytes of their file.
 ///
 /// [`open`](LightTree::open) checks only the header and the section table;
-/// [`verify`](LightTree::verify) proves the rest. Sampling an unverified tree may give wrong numbers,
-/// but it ends, stays inside the bytes and does not panic. A file whose links do not form trees is dark.
+/// [`verify`](LightTree::verify) proves the rest, [`verify_frame`](LightTree::verify_frame) what one frame
+/// samples. Sampling an unverified tree may give wrong numbers, but it ends, stays inside the bytes and does
+/// not panic. A frame whose links do not form trees is dark.
 pub struct LightTree<D> {
     container: Container<D>,
     trees: Range<usize>,
     groups: Range<usize>,
     instances: Option<Range<usize>>,
     frames: Option<Range<usize>>,
+    fingerprints: Option<Range<usize>>,
     forced: Option<Range<usize>>,
     lights: Range<usize>,
     paths: Range<usize>,
     textures: Option<Range<usize>>,
     means: Option<Range<usize>>,
-    /// Whether every walk ends in reasonable time, once that is known.
-    walkable: OnceLock<bool>,
+    known: Arc<Known>,
 }
 
 impl<D: AsRef<[u8]>> LightTree<D> {
@@ -48,12 +52,13 @@ impl<D: AsRef<[u8]>> LightTree<D> {
             groups: required::<Group>(&container, records::GROUPS)?,
             instances: container.find::<InstanceRow>(records::INSTANCES)?,
             frames: container.find::<FrameRow>(records::FRAMES)?,
+            fingerprints: container.find::<[u8; 32]>(records::FINGERPRINTS)?,
             forced: container.find::<u32>(records::FORCED)?,
             lights: required::<LightRow>(&container, records::LIGHTS)?,
             paths: required::<u8>(&container, records::PATHS)?,
             textures: container.find::<TextureRow>(records::TEXTURES)?,
             means: container.find::<MeanRow>(records::MEANS)?,
-            walkable: OnceLock::new(),
+            known: Arc::default(),
             container,
         })
     }
@@ -66,18 +71,24 @@ impl<D: AsRef<[u8]>> LightTree<D> {
             groups: self.groups.clone(),
             instances: self.instances.clone(),
             frames: self.frames.clone(),
+            fingerprints: self.fingerprints.clone(),
             forced: self.forced.clone(),
             lights: self.lights.clone(),
             paths: self.paths.clone(),
             textures: self.textures.clone(),
             means: self.means.clone(),
-            walkable: self.walkable.clone(),
+            known: self.known.clone(),
         }
     }
 
     /// The bytes of the file.
     pub fn into_bytes(self) -> D {
         self.container.into_bytes()
+    }
+
+    /// What holds the bytes of the file.
+    pub fn data(&self) -> &D {
+        self.container.data()
     }
 
     /// The fingerprint of the content the trees were built from.
@@ -111,9 +122,24 @@ impl<D: AsRef<[u8]>> LightTree<D> {
         &rest[..rest.len().min(tree.group_count as usize)]
     }
 
+    /// The rows of the instances that the leaves of a tree stand for.
+    pub(super) fn placed_in(&self, tree: &TreeRow) -> impl Iterator<Item = u32> + '_ {
+        let links = self.groups_of(tree).iter().flat_map(|g| (0..WIDTH).map(|lane| g.link(lane)));
+        links.filter_map(|link| match link {
+            Link::Instance(row) => Some(row),
+            _ => None,
+        })
+    }
+
     /// The frames that have a tree of their own; empty if nothing changes.
     pub fn frames(&self) -> &[FrameRow] {
         self.frames.as_ref().map_or(&[], |range| self.container.view(range))
+    }
+
+    /// The fingerprint of each row of [`frames`](LightTree::frames): BLAKE3 over what changes, as it is
+    /// in that frame. Empty in files before version 1.2.
+    pub fn fingerprints(&self) -> &[[u8; 32]] {
+        self.fingerprints.as_ref().map_or(&[], |range| self.container.view(range))
     }
 
     /// The lights.
@@ -163,6 +189,12 @@ impl<D: AsRef<[u8]>> LightTree<D> {
         lights.get(row).map_or(self.emitter_count() as u32, |light| light.first_emitter)
     }
 
+    /// How the emitters are numbered.
+    pub fn numbering(&self) -> Numbering {
+        let count = self.emitter_count() as u32;
+        Numbering { first_of_class: [1, 2, 3, 4].map(|class| self.first_of_class(class)), count }
+    }
+
     /// The `META` section: a JSON text for people.
     pub fn meta(&self) -> &str {
         let range = self.container.find::<u8>(records::META).ok().flatten();
@@ -186,9 +218,20 @@ impl<D: AsRef<[u8]>> LightTree<D> {
         self.container.minor_version() > store::VERSION.1
     }
 
-    /// Notes that walks have been proved to end.
-    pub(super) fn note_walkable(&self) {
-        self.walkable.get_or_init(|| true);
+    /// What has been found out so far.
+    pub(super) fn known(&self) -> &Known {
+        &self.known
+    }
+
+    /// The same of one tree; `None` if there is no such tree.
+    pub(super) fn known_of(&self, row: u32) -> Option<&OfTree> {
+        self.known.of_tree(row, self.trees().len())
+    }
+
+    /// Whether a tree, and all that it places, is proven to keep the format's promises.
+    pub(super) fn is_proven(&self, row: u32) -> bool {
+        let is_known = |known: &OfTree| known.proven.get().is_some();
+        self.known.is_whole() || self.known_of(row).is_some_and(is_known)
     }
 
     /// Compares all checksums.
@@ -204,33 +247,43 @@ impl<D: AsRef<[u8]>> LightTree<D> {
         (kind == Some(TreeKind::Still)).then_some(row as u32)
     }
 
+    /// The row of a frame among [`frames`](LightTree::frames).
+    pub fn row_of(&self, frame: i32) -> Option<usize> {
+        self.frames().binary_search_by_key(&frame, |row| row.frame).ok()
+    }
+
     /// What a frame samples: the row of its tree, `None` if nothing shines then, and the instances
     /// of its forced lights.
     ///
     /// # Errors
     /// [`NoSuchFrame`] if lights change and the file was built without this frame.
     pub fn roots_at(&self, frame: i32) -> Result<(Option<u32>, &[u32]), NoSuchFrame> {
-        if !*self.walkable.get_or_init(|| self.is_walkable()) {
-            return Ok((None, &[]));
+        let (root, forced) = self.told_roots_at(frame)?;
+        let tree_of = |row: &u32| self.instances().get(*row as usize).map(|row| row.tree);
+        let mut reached = root.into_iter().chain(forced.iter().filter_map(tree_of));
+        match reached.all(|row| self.is_walkable(row)) {
+            true => Ok((root, forced)),
+            false => Ok((None, &[])),
         }
-        let forced = self.forced();
-        if self.frames().is_empty() {
+    }
+
+    /// The same, believed.
+    fn told_roots_at(&self, frame: i32) -> Result<(Option<u32>, &[u32]), NoSuchFrame> {
+        let (frames, forced) = (self.frames(), self.forced());
+        if frames.is_empty() {
             return Ok((self.still_tree(), forced));
         }
-        let frames = self.frames();
-        match frames.binary_search_by_key(&frame, |row| row.frame) {
-            Ok(found) => {
-                let FrameRow { tree, first_forced, forced_count, .. } = frames[found];
-                let rest = forced.get(first_forced as usize..).unwrap_or_default();
-                let own = &rest[..rest.len().min(forced_count as usize)];
-                Ok((Some(tree).filter(|&tree| tree != NO_TREE), own))
-            }
-            Err(_) => Err(NoSuchFrame {
+        let Some(row) = self.row_of(frame) else {
+            return Err(NoSuchFrame {
                 frame,
                 first: frames.first().map_or(0, |row| row.frame),
                 last: frames.last().map_or(0, |row| row.frame),
-            }),
-        }
+            });
+        };
+        let FrameRow { tree, first_forced, forced_count, .. } = frames[row];
+        let rest = forced.get(first_forced as usize..).unwrap_or_default();
+        let own = &rest[..rest.len().min(forced_count as usize)];
+        Ok((Some(tree).filter(|&tree| tree != NO_TREE), own))
     }
 }
 

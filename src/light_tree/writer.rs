@@ -2,12 +2,13 @@
 
 use super::base::{Base, Leaf};
 use super::builder::build_tree;
-use super::group::{Group, WIDTH};
+use super::group::Group;
 use super::node::{Link, Node};
 use super::records::{
     self, FrameRow, InstanceRow, LightLook, LightRow, MeanRow, NO_TREE, TextureRow, TreeKind,
     TreeRow,
 };
+use super::tree::LightTree;
 use crate::bounds::LightBounds;
 use crate::math::Similarity;
 use crate::store::{AlignedBytes, ContainerWriter};
@@ -90,6 +91,7 @@ pub struct LightTreeWriter<'a> {
     groups: Vec<Group>,
     instances: Vec<InstanceRow>,
     frames: Vec<FrameRow>,
+    fingerprints: Vec<[u8; 32]>,
     forced: Vec<u32>,
     textures: Vec<TextureRow>,
     means: Vec<MeanRow>,
@@ -159,10 +161,19 @@ impl<'a> LightTreeWriter<'a> {
         bounds: &[LightBounds],
     ) -> Option<u32> {
         let (row, groups) = self.base.as_ref()?.own_tree(light, nth, bounds)?;
+        self.reused += row.leaf_count as usize;
         self.trees.push(TreeRow { first_group: self.groups.len() as u32, ..*row });
         self.groups.extend_from_slice(groups);
-        self.reused += row.leaf_count as usize;
         Some(self.trees.len() as u32 - 1)
+    }
+
+    /// Adds a tree of another file as it is, and returns its row. Instances that its leaves stand for must
+    /// have the same rows in both files.
+    pub fn add_copy<D: AsRef<[u8]>>(&mut self, file: &LightTree<D>, row: u32) -> u32 {
+        let tree = &file.trees()[row as usize];
+        self.trees.push(TreeRow { first_group: self.groups.len() as u32, ..*tree });
+        self.groups.extend_from_slice(file.groups_of(tree));
+        self.trees.len() as u32 - 1
     }
 
     fn leaf(&self, link: Link) -> Leaf {
@@ -180,36 +191,6 @@ impl<'a> LightTreeWriter<'a> {
         }
     }
 
-    /// Adds a copy of the last tree, for a frame in which the same leaves stand in the same places
-    /// but shine differently: its clusters stay and their energies are summed anew.
-    ///
-    /// # Panics
-    /// If there is no tree yet.
-    pub fn add_tree_with_energies(&mut self, energy_of: impl Fn(Link) -> f32) -> u32 {
-        let mut row = *self.trees.last().expect("there is a tree to copy");
-        let (start, end) = (row.first_group as usize, (row.first_group + row.group_count) as usize);
-        row.first_group = self.groups.len() as u32;
-        self.groups.extend_from_within(start..end);
-        let groups = &mut self.groups[row.first_group as usize..];
-        let mut sums = vec![0f32; groups.len()];
-        for own in (0..groups.len()).rev() {
-            let mut sum = 0.0;
-            for lane in 0..WIDTH {
-                let energy = match groups[own].link(lane) {
-                    Link::Nothing => continue,
-                    Link::Inner(ahead) => sums[own + ahead as usize],
-                    leaf => energy_of(leaf),
-                };
-                groups[own].set_energy(lane, energy);
-                sum += f64::from(energy);
-            }
-            sums[own] = sum as f32;
-        }
-        row.root = row.root.with_energy(sums[0]);
-        self.trees.push(row);
-        self.trees.len() as u32 - 1
-    }
-
     /// The bounds of a whole tree in its own space. A leaf that stands for the tree needs them.
     pub fn bounds_of(&self, tree: u32) -> LightBounds {
         self.trees[tree as usize].root.bounds()
@@ -222,14 +203,22 @@ impl<'a> LightTreeWriter<'a> {
         self.instances.len() as u32 - 1
     }
 
-    /// Says which tree a frame samples and which instances are of forced lights. Frames must be added
-    /// in ascending order. Without any, every frame samples the tree of what stands still.
-    pub fn add_frame(&mut self, frame: i32, tree: Option<u32>, forced: &[u32]) {
+    /// Says which tree a frame samples and which instances are of forced lights; `fingerprint` is BLAKE3 over
+    /// what changes, as it is in this frame. Frames must be added in ascending order. Without any, every
+    /// frame samples the tree of what stands still.
+    pub fn add_frame(
+        &mut self,
+        frame: i32,
+        fingerprint: [u8; 32],
+        tree: Option<u32>,
+        forced: &[u32],
+    ) {
         let first_forced = self.forced.len() as u32;
         let forced_count = forced.len() as u32;
         self.forced.extend_from_slice(forced);
         let tree = tree.unwrap_or(NO_TREE);
         self.frames.push(FrameRow { frame, tree, first_forced, forced_count });
+        self.fingerprints.push(fingerprint);
     }
 
     /// Says which instances are of forced lights where there are no frames.
@@ -257,6 +246,8 @@ impl<'a> LightTreeWriter<'a> {
         }
         if !self.frames.is_empty() {
             file.section(records::FRAMES, true, &self.frames);
+            // Sampling the trees does not need them.
+            file.section(records::FINGERPRINTS, false, &self.fingerprints);
         }
         if !self.forced.is_empty() {
             file.section(records::FORCED, true, &self.forced);
@@ -268,7 +259,7 @@ impl<'a> LightTreeWriter<'a> {
         file.section_with(records::PATHS, true, lights.path_length, |place: &mut [u8]| {
             lights.write_paths(place);
         });
-        // Sampling the trees does not need them.
+        // Nor these.
         if !self.textures.is_empty() {
             file.section(records::TEXTURES, false, &self.textures);
             file.section(records::MEANS, false, &self.means);

@@ -4,7 +4,7 @@
 //! has the same ray in two versions of a scene, so their pictures differ only by what changed.
 
 use super::contributions::reflected;
-use crate::light_tree::{NoSuchFrame, Picked};
+use crate::light_tree::{LightTree, NoSuchFrame, Picked};
 use crate::render::RenderDelegate;
 use crate::render::path::{Integrator, Vertex};
 use rayon::prelude::*;
@@ -18,12 +18,13 @@ const POINTS_AT_INFINITY: u32 = 8;
 ///
 /// # Errors
 /// If the tree lacks the frame.
-pub fn direct_light<D: AsRef<[u8]> + Sync>(
-    delegate: &RenderDelegate<D>,
+pub fn direct_light(
+    delegate: &RenderDelegate,
+    tree: &LightTree<impl AsRef<[u8]>>,
     frame: i32,
     visibility: bool,
 ) -> Result<Vec<Option<f32>>, NoSuchFrame> {
-    delegate.at_frame(frame, |integrator| {
+    delegate.at_frame(tree, frame, |integrator| {
         let (width, height) = (integrator.settings.width, integrator.settings.height);
         let pixel = |i: u32| {
             let vertex = integrator.probe(i % width, i / width, 0, 0)?;

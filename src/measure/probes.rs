@@ -7,7 +7,7 @@
 //! the part that is left to reflected rays does not count. The ideal is 0.
 
 use super::contributions::{Contributions, shares};
-use crate::light_tree::NoSuchFrame;
+use crate::light_tree::{LightTree, NoSuchFrame};
 use crate::math::random::{Sampler, hash};
 use crate::render::path::{Integrator, Vertex};
 use crate::render::picker::{LightPicker, PickScratch, Wanted};
@@ -79,12 +79,13 @@ struct Probe {
 ///
 /// # Errors
 /// If the tree lacks the frame.
-pub fn at_probes<D: AsRef<[u8]> + Sync>(
-    delegate: &RenderDelegate<D>,
+pub fn at_probes(
+    delegate: &RenderDelegate,
+    tree: &LightTree<impl AsRef<[u8]>>,
     frame: i32,
     options: &ProbeOptions,
 ) -> Result<ProbeReport, NoSuchFrame> {
-    delegate.at_frame(frame, |integrator| report(integrator, options))
+    delegate.at_frame(tree, frame, |integrator| report(integrator, options))
 }
 
 fn report(integrator: &Integrator, options: &ProbeOptions) -> ProbeReport {

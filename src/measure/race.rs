@@ -5,6 +5,7 @@
 //! another entrant's error follows, because error times time is constant as samples are added. Stratified
 //! samples do better than that, so each entrant should get about as many samples as it needs.
 
+use crate::light_tree::LightTree;
 use crate::math::color::luminance;
 use crate::render::{RenderDelegate, RenderError, RenderSettings};
 use serde::Serialize;
@@ -50,8 +51,9 @@ pub struct Result {
 ///
 /// # Errors
 /// If the tree lacks the frame, or settings do not fit the scene.
-pub fn race<D: AsRef<[u8]> + Sync>(
-    delegate: &mut RenderDelegate<D>,
+pub fn race(
+    delegate: &mut RenderDelegate,
+    tree: &LightTree<impl AsRef<[u8]>>,
     entrants: &[Entrant],
     options: &RaceOptions,
     mut done: impl FnMut(),
@@ -65,7 +67,7 @@ pub fn race<D: AsRef<[u8]> + Sync>(
             let seed = entrant.settings.seed.wrapping_add(picture);
             delegate.set_settings(RenderSettings { seed, ..entrant.settings.clone() });
             let started = Instant::now();
-            let rendered = delegate.render(options.frame, &())?;
+            let rendered = delegate.render(tree, options.frame, &())?;
             times.push(started.elapsed().as_secs_f64());
             lights += rendered.stats.trace.light_picks;
             sums.resize(rendered.buffers.beauty().count(), [0.0; 2]);

@@ -7,10 +7,13 @@
 //! which makes pictures noisier but not wrong.
 
 use super::build::in_world;
-use super::survey::{Group, PlacedLight, Survey};
+use super::survey::{Group, PlacedLight, SharedBounds, Survey, SurveyedFrame, numbering_of};
 use super::textures;
 use crate::bounds::LightBounds;
-use crate::light_tree::{LightList, LightRow, LightTree, Link, Node, TreeKind, TreeRow, WIDTH};
+use crate::emitter::{Emitters, TextureMeans};
+use crate::light_tree::{
+    InstanceRow, LightList, LightRow, LightSummary, LightTree, Link, Node, TreeKind, TreeRow, WIDTH,
+};
 use rayon::prelude::*;
 use std::fmt;
 
@@ -63,27 +66,44 @@ pub(super) fn find_contradiction<D: AsRef<[u8]> + Sync>(
     survey: &Survey,
     leaves: bool,
 ) -> Option<Contradiction> {
-    let agreement = Agreement { tree, survey };
-    let of_trees = || if leaves { agreement.of_trees() } else { None };
-    agreement.of_lights().or_else(|| agreement.of_textures()).or_else(of_trees)
+    let agreement = Agreement::with_survey(tree, survey);
+    let of_trees = || {
+        let frames = || survey.frames.iter().find_map(|frame| agreement.of_frame(frame));
+        agreement.of_shared().or_else(|| agreement.of_still()).or_else(frames)
+    };
+    (agreement.of_lights(&survey.lights))
+        .or_else(|| agreement.of_textures(&survey.textures))
+        .or_else(|| if leaves { agreement.of_number_of_trees().or_else(of_trees) } else { None })
 }
 
-struct Agreement<'a, D> {
-    tree: &'a LightTree<D>,
-    survey: &'a Survey,
+/// A tree, and what has been surveyed of its scene.
+pub(super) struct Agreement<'a, D> {
+    pub tree: &'a LightTree<D>,
+    pub shared: &'a [SharedBounds],
+    /// How many of them have the same rows in the file.
+    pub lasting: usize,
+    pub still: &'a Group,
+    /// What changes, as far as it is surveyed.
+    pub changing: Vec<&'a Group>,
 }
 
-impl<D: AsRef<[u8]> + Sync> Agreement<'_, D> {
+impl<'a, D: AsRef<[u8]> + Sync> Agreement<'a, D> {
+    fn with_survey(tree: &'a LightTree<D>, survey: &'a Survey) -> Self {
+        let Survey { shared, still, frames, .. } = survey;
+        let changing = frames.iter().map(|frame| &*frame.group).collect();
+        Agreement { tree, shared, lasting: shared.len(), still, changing }
+    }
+
     /// The rows of lights.
-    fn of_lights(&self) -> Option<Contradiction> {
-        let list = LightList::new(&self.survey.lights);
+    fn of_lights(&self, lights: &[LightSummary]) -> Option<Contradiction> {
+        let list = LightList::new(lights);
         let rows = self.tree.lights();
-        if rows.len() != self.survey.lights.len() {
+        if rows.len() != lights.len() {
             return Some(self.in_general("the number of lights"));
         }
         let differs = |(at, row): (usize, &LightRow)| {
             let now = list.row(at);
-            let path = &self.survey.lights[at].path;
+            let path = &lights[at].path;
             let what = if self.tree.light_path(row) != path {
                 "its path"
             } else if (row.first_emitter, row.emitter_count)
@@ -107,42 +127,56 @@ impl<D: AsRef<[u8]> + Sync> Agreement<'_, D> {
     }
 
     /// The means of textures.
-    fn of_textures(&self) -> Option<Contradiction> {
-        let is_so =
-            self.tree.textures().is_empty() || textures::has_just(self.tree, &self.survey.textures);
+    fn of_textures(&self, means: &[TextureMeans]) -> Option<Contradiction> {
+        let is_so = self.tree.textures().is_empty() || textures::has_just(self.tree, means);
         (!is_so).then(|| self.in_general("the means of the emission textures"))
     }
 
-    /// The leaves of all trees, and where they are placed.
-    fn of_trees(&self) -> Option<Contradiction> {
-        let Agreement { tree, survey } = *self;
+    /// How many trees there are of lights that have their own.
+    fn of_number_of_trees(&self) -> Option<Contradiction> {
         let is_shared = |row: &&TreeRow| TreeKind::of(row) == Some(TreeKind::Shared);
-        let shared = tree.trees().iter().take_while(is_shared).count();
-        if shared != survey.shared.len() {
-            return Some(self.in_general("the number of lights that have trees of their own"));
+        let shared = self.tree.trees().iter().take_while(is_shared).count();
+        let what = "the number of lights that have trees of their own";
+        (shared != self.shared.len()).then(|| self.in_general(what))
+    }
+
+    /// How emitters are numbered.
+    pub fn of_numbering(&self, emitters: &Emitters) -> Option<Contradiction> {
+        let what = "how the emitters are numbered";
+        (self.tree.numbering() != numbering_of(emitters)).then(|| self.in_general(what))
+    }
+
+    /// The leaves of the lights that have trees of their own in every frame.
+    pub fn of_shared(&self) -> Option<Contradiction> {
+        let rows = (0..self.lasting).into_par_iter();
+        rows.find_map_first(|row| self.of_own_tree(row as u32, row))
+    }
+
+    /// The leaves of a tree that a light has for itself.
+    fn of_own_tree(&self, row: u32, shared: usize) -> Option<Contradiction> {
+        let bounds = &self.shared[shared].bounds;
+        let leaf = |link| match link {
+            Link::Emitter(own) => bounds.get(own as usize).copied(),
+            _ => None,
+        };
+        match self.tree.trees().get(row as usize) {
+            Some(tree) if TreeKind::of(tree) == Some(TreeKind::Shared) => {
+                self.of_leaves(tree, bounds.len(), leaf, |_| self.light_of_shared(shared))
+            }
+            _ => Some(self.in_general("the number of lights that have trees of their own")),
         }
-        let own = tree.trees().par_iter().zip(&survey.shared).enumerate();
-        let of_own = own.find_map_first(|(at, (row, shared))| {
-            let group = |link| match link {
-                Link::Emitter(own) => shared.bounds.get(own as usize).copied(),
-                _ => None,
-            };
-            self.of_leaves(row, shared.bounds.len(), group, |_| self.light_of_shared(at))
-        });
-        let frames = || (0..survey.frames.len()).find_map(|at| self.of_frame(at));
-        of_own.or_else(|| self.of_still()).or_else(frames)
     }
 
     /// What stands still, and the forced lights of a file without frames.
-    fn of_still(&self) -> Option<Contradiction> {
-        let still = &self.survey.still;
+    pub fn of_still(&self) -> Option<Contradiction> {
+        let still = self.still;
         let row = self.tree.still_tree();
         let of_row = match row {
             Some(row) => self.of_group(&self.tree.trees()[row as usize], still, 0),
             None if still.flat.is_empty() && still.placed.is_empty() => None,
             None => Some(self.in_general("that nothing stands still")),
         };
-        let forced = || match self.survey.frames.is_empty() {
+        let forced = || match self.tree.frames().is_empty() {
             true => self.of_forced(self.tree.forced(), [still].into_iter()),
             false => None,
         };
@@ -150,9 +184,9 @@ impl<D: AsRef<[u8]> + Sync> Agreement<'_, D> {
     }
 
     /// What changes, in one frame.
-    fn of_frame(&self, at: usize) -> Option<Contradiction> {
-        let (frame, group) = &self.survey.frames[at];
-        let Ok((row, forced)) = self.tree.roots_at(*frame) else {
+    pub fn of_frame(&self, frame: &SurveyedFrame) -> Option<Contradiction> {
+        let SurveyedFrame { number, group, .. } = frame;
+        let Ok((row, forced)) = self.tree.roots_at(*number) else {
             return Some(self.in_general("the frames"));
         };
         let still = self.tree.still_tree();
@@ -166,7 +200,7 @@ impl<D: AsRef<[u8]> + Sync> Agreement<'_, D> {
             },
             None => Some(self.in_general("that nothing shines in a frame")),
         };
-        of_row.or_else(|| self.of_forced(forced, [&self.survey.still, group].into_iter()))
+        of_row.or_else(|| self.of_forced(forced, [self.still, group].into_iter()))
     }
 
     /// The tree over a group. `below` is 1 if the tree of what stands still is one of its leaves, else 0.
@@ -241,13 +275,19 @@ impl<D: AsRef<[u8]> + Sync> Agreement<'_, D> {
         let mut rows = rows.iter();
         for placed in groups.flat_map(|group| &group.forced) {
             let row = rows.next().and_then(|&row| self.tree.instances().get(row as usize));
-            let is_so = row.is_some_and(|row| {
-                row.to_local == placed.to_local
-                    && (row.tree, row.first_emitter) == (placed.shared, placed.first_emitter)
-            });
-            if !is_so {
+            let differs = |row: &InstanceRow| {
+                let is_placed_so =
+                    (row.to_local, row.first_emitter) == (placed.to_local, placed.first_emitter);
+                let shared = placed.shared as usize;
+                match shared < self.lasting {
+                    true => !is_placed_so || row.tree != placed.shared,
+                    // Its tree is that of one frame, and has another row in the file than here.
+                    false => !is_placed_so || self.of_own_tree(row.tree, shared).is_some(),
+                }
+            };
+            if row.is_none_or(differs) {
                 let path = self.light_of(placed.first_emitter);
-                return Some(Contradiction { path, what: "where it is placed" });
+                return Some(Contradiction { path, what: "where it is placed, or its tree" });
             }
         }
         rows.next().map(|_| self.in_general("the number of forced lights"))
@@ -268,8 +308,7 @@ impl<D: AsRef<[u8]> + Sync> Agreement<'_, D> {
 
     /// The path of the first light that a shared tree serves.
     fn light_of_shared(&self, shared: usize) -> String {
-        let survey = self.survey;
-        let groups = std::iter::once(&survey.still).chain(survey.frames.iter().map(|(_, g)| g));
+        let groups = std::iter::once(self.still).chain(self.changing.iter().copied());
         let mut placed = groups.flat_map(|group| group.placed.iter().chain(&group.forced));
         let found = placed.find(|placed| placed.shared as usize == shared);
         found.map_or_else(String::new, |placed| self.light_of(placed.first_emitter))

@@ -1,11 +1,12 @@
 //! Building the trees of a shot.
 
 use super::Survey;
-use super::survey::{Group, PlacedLight};
-use super::textures;
+use super::survey::{Group, PlacedLight, SurveyedFrame};
+use super::surveyor::Surveyor;
+use super::{fingerprint, textures};
 use crate::bounds::{Aabb, Cone, LightBounds};
 use crate::light_tree::{
-    ALGORITHM_VERSION, Base, LightList, LightTree, LightTreeWriter, Link, TreeKind,
+    ALGORITHM_VERSION, Base, LightList, LightSummary, LightTree, LightTreeWriter, Link, TreeKind,
 };
 use crate::math::Similarity;
 use crate::store::AlignedBytes;
@@ -27,8 +28,8 @@ pub struct Rebuilt {
 }
 
 /// Builds the trees: one in its own space for each light that is shared, carried along or forced; one
-/// over what stands still; and one a frame over that tree and what changes. The same survey gives the
-/// same bytes.
+/// over what stands still; and one a frame over that tree and what changes. Frames that are alike share
+/// theirs. The same survey gives the same bytes.
 pub fn build_tree(survey: &Survey) -> AlignedBytes {
     let lights = LightList::new(&survey.lights);
     write(survey, &lights, LightTreeWriter::default()).bytes
@@ -49,19 +50,8 @@ pub fn rebuild_tree<D: AsRef<[u8]>>(survey: &Survey, base: &LightTree<D>) -> Reb
 fn write(survey: &Survey, lights: &LightList, writer: LightTreeWriter) -> Rebuilt {
     let mut builder = Builder { writer, shared: Vec::new() };
     builder.share(survey);
-    let links = builder.links(&survey.still, None);
-    let bounds = builder.bounds(&survey.still, None);
-    let still = builder.writer.add_tree(TreeKind::Still, &bounds, |i| links[i]);
-    let forced_still = builder.instances(&survey.still.forced);
-    if survey.frames.is_empty() {
-        builder.writer.add_forced(&forced_still);
-    } else {
-        let below = still.map(|still| {
-            let leaf = builder.writer.bounds_of(still);
-            (Link::Instance(builder.writer.add_instance(still, Similarity::IDENTITY, 0)), leaf)
-        });
-        builder.frames(survey, still, below, &forced_still);
-    }
+    let forced = builder.still(&survey.still, None);
+    builder.frames(&survey.frames, forced);
     let mut writer = builder.writer;
     for means in &survey.textures {
         writer.add_texture(means.fingerprint, textures::rows(means));
@@ -77,6 +67,35 @@ fn write(survey: &Survey, lights: &LightList, writer: LightTreeWriter) -> Rebuil
     let base_contradicts = writer.base_contradicts();
     let bytes = writer.finish(lights, &meta.to_string(), survey.fingerprint);
     Rebuilt { bytes, leaves, reused, base_contradicts }
+}
+
+/// Builds the trees of one frame, or of none if nothing changes, to be sampled and not to be kept: `lights`
+/// need no paths. What stands still, and what is carried along, is copied from the trees of an earlier frame
+/// of the shot, if there are any.
+pub(super) fn build_frame<D: AsRef<[u8]>>(
+    surveyor: &Surveyor,
+    frame: &[SurveyedFrame],
+    lights: &[LightSummary],
+    earlier: Option<&LightTree<D>>,
+) -> AlignedBytes {
+    let mut builder = Builder { writer: LightTreeWriter::default(), shared: Vec::new() };
+    let copied = earlier.map_or(0, |_| surveyor.lasting);
+    for (row, shared) in (0..).zip(&surveyor.shared) {
+        let tree = match earlier.filter(|_| (row as usize) < copied) {
+            Some(earlier) => Some(builder.writer.add_copy(earlier, row)),
+            None => builder.writer.add_tree(TreeKind::Shared, &shared.bounds, own),
+        };
+        builder.shared.extend(tree);
+    }
+    let still = earlier.map(|earlier| {
+        let row = earlier.still_tree()?;
+        Some(builder.writer.add_copy(earlier, row))
+    });
+    let forced = builder.still(&surveyor.still, still);
+    builder.frames(frame, forced);
+    let prints = frame.iter().map(|frame| (frame.number, frame.fingerprint));
+    let fingerprint = fingerprint::of_shot(&surveyor.still_fingerprint, prints);
+    builder.writer.finish(&LightList::new(lights), "{}", fingerprint)
 }
 
 /// The key in `META` of the algorithm's version.
@@ -109,13 +128,23 @@ struct Builder<'a> {
     shared: Vec<u32>,
 }
 
+/// What all frames have in common.
+struct Still {
+    /// The row of its tree, if there is one.
+    tree: Option<u32>,
+    /// The forced lights, by rows of instances.
+    forced: Vec<u32>,
+}
+
 impl Builder<'_> {
     /// The trees of lights that have one of their own.
     fn share(&mut self, survey: &Survey) {
-        let groups = || std::iter::once(&survey.still).chain(survey.frames.iter().map(|(_, g)| g));
+        let frames = survey.frames.iter().map(|frame| &*frame.group);
         let mut users = vec![Vec::new(); survey.shared.len()];
-        for placed in groups().flat_map(|group| group.placed.iter().chain(&group.forced)) {
-            users[placed.shared as usize].push(placed.light as usize);
+        for group in std::iter::once(&survey.still).chain(frames) {
+            for placed in group.placed.iter().chain(&group.forced) {
+                users[placed.shared as usize].push(placed.light as usize);
+            }
         }
         // A forced light that moves has one a frame.
         let mut trees_of = vec![0; survey.lights.len()];
@@ -133,37 +162,38 @@ impl Builder<'_> {
         }
     }
 
-    fn frames(
-        &mut self,
-        survey: &Survey,
-        still: Option<u32>,
-        below: Option<(Link, LightBounds)>,
-        forced_still: &[u32],
-    ) {
-        let mut before: Option<(&Group, Vec<Link>)> = None;
-        for (frame, group) in &survey.frames {
-            let mut forced = forced_still.to_vec();
-            forced.extend(self.instances(&group.forced));
-            if group.flat.is_empty() && group.placed.is_empty() {
-                self.writer.add_frame(*frame, still, &forced);
-                continue;
-            }
-            // Where only brightness has changed, the clusters of the frame before will do.
-            if let Some((last, links)) = &before
-                && stand_alike(last, group)
-            {
+    /// The tree of what stands still. `copied` is its row, or that there is none, if it is there already.
+    fn still(&mut self, group: &Group, copied: Option<Option<u32>>) -> Still {
+        let links = self.links(group, None);
+        let tree = copied.unwrap_or_else(|| {
+            let bounds = self.bounds(group, None);
+            self.writer.add_tree(TreeKind::Still, &bounds, |i| links[i])
+        });
+        Still { tree, forced: self.instances(&group.forced) }
+    }
+
+    /// The trees of frames; if there are none, every frame samples what stands still.
+    fn frames(&mut self, frames: &[SurveyedFrame], Still { tree: still, forced }: Still) {
+        if frames.is_empty() {
+            return self.writer.add_forced(&forced);
+        }
+        let below = still.map(|still| {
+            let leaf = self.writer.bounds_of(still);
+            (Link::Instance(self.writer.add_instance(still, Similarity::IDENTITY, 0)), leaf)
+        });
+        let mut seen = HashMap::new();
+        for SurveyedFrame { number, group, fingerprint } in frames {
+            let (tree, forced) = seen.entry(fingerprint).or_insert_with(|| {
+                let own = self.instances(&group.forced);
+                let forced = [&forced[..], &own].concat();
+                if group.flat.is_empty() && group.placed.is_empty() {
+                    return (still, forced);
+                }
+                let links = self.links(group, below.as_ref());
                 let bounds = self.bounds(group, below.as_ref());
-                let energies: HashMap<Link, f32> =
-                    links.iter().copied().zip(bounds.iter().map(|b| b.energy)).collect();
-                let tree = self.writer.add_tree_with_energies(|link| energies[&link]);
-                self.writer.add_frame(*frame, Some(tree), &forced);
-                continue;
-            }
-            let links = self.links(group, below.as_ref());
-            let bounds = self.bounds(group, below.as_ref());
-            let tree = self.writer.add_tree(TreeKind::Frame, &bounds, |i| links[i]);
-            self.writer.add_frame(*frame, tree, &forced);
-            before = Some((group, links));
+                (self.writer.add_tree(TreeKind::Frame, &bounds, |i| links[i]), forced)
+            });
+            self.writer.add_frame(*number, *fingerprint, *tree, forced);
         }
     }
 
@@ -201,14 +231,6 @@ impl Builder<'_> {
         };
         placed.iter().map(add).collect()
     }
-}
-
-/// Whether two frames differ in nothing but energies.
-fn stand_alike(a: &Group, b: &Group) -> bool {
-    let place = |bounds: &LightBounds| LightBounds { energy: 1.0, ..*bounds };
-    let dull = |placed: &PlacedLight| (placed.shared, placed.to_local, placed.first_emitter);
-    a.flat.iter().map(place).eq(b.flat.iter().map(place))
-        && a.placed.iter().map(dull).eq(b.placed.iter().map(dull))
 }
 
 /// The bounds of a tree, taken from its own space to world space and widened a little against rounding.

@@ -5,16 +5,16 @@ use super::build::algorithm_of;
 use super::frames::spell;
 use super::{Survey, frames_of, survey};
 use crate::emitter::{Emitters, LightOverflow};
-use crate::light_tree::{ALGORITHM_VERSION, LightSummary, LightTree};
+use crate::light_tree::{ALGORITHM_VERSION, LightSummary, LightTree, NoSuchFrame};
 use crate::scene::Scene;
-use crate::store::{self, Mmap, StoreError};
+use crate::store::{self, MappedFile, StoreError};
 use std::collections::BTreeMap;
 use std::fmt;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
 /// A tree over a mapped file.
-pub type OpenedTree = LightTree<Mmap>;
+pub type OpenedTree = LightTree<MappedFile>;
 
 /// Why a tree file cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -56,6 +56,23 @@ pub enum TreeError {
         /// The command that builds it again, as a shell takes it.
         remedy: String,
     },
+    /// It was built for other frames.
+    #[error("{}: {cause}", path.display())]
+    NoSuchFrame {
+        /// The file.
+        path: PathBuf,
+        /// The frames that it has.
+        cause: NoSuchFrame,
+    },
+    /// Somebody wrote to the file while it was in use.
+    #[error(
+        "{}: was written to while it was in use, so what it says is not what was checked; publish a tree under another name and rename it over the old one, then render again with --resume",
+        path.display()
+    )]
+    Overwritten {
+        /// The file.
+        path: PathBuf,
+    },
     /// It was built by another version of the algorithm.
     #[error("{}: it was built by another version of the algorithm; build it again", path.display())]
     OtherAlgorithm {
@@ -83,7 +100,7 @@ pub fn is_tree_file(path: &Path) -> bool {
 /// # Errors
 /// If the file cannot be read or breaks a rule.
 pub fn open_tree(path: &Path, verify: bool) -> Result<OpenedTree, TreeError> {
-    let map = store::map(path).map_err(|cause| TreeError::Io { path: path.into(), cause })?;
+    let map = MappedFile::open(path).map_err(|cause| TreeError::Io { path: path.into(), cause })?;
     let broken = |cause| TreeError::Broken { path: path.into(), cause };
     let tree = LightTree::open(map).map_err(broken)?;
     if verify {
@@ -161,7 +178,7 @@ impl fmt::Display for StaleTree {
             write!(f, " and {unnamed} more")?;
         }
         if [&self.added, &self.removed, &self.dirtied].iter().all(|paths| paths.is_empty()) {
-            write!(f, ": it was built by another version of the algorithm")?;
+            write!(f, ": it is damaged, or was built by another version of the algorithm")?;
         }
         write!(f, ". Build it again: {}", self.remedy)
     }
@@ -169,7 +186,8 @@ impl fmt::Display for StaleTree {
 
 impl std::error::Error for StaleTree {}
 
-/// Compares a tree with the scene it should belong to. `forced` are the paths that the user forces in
+/// Compares a whole tree with the scene it should belong to, in all its frames;
+/// [`ShotTrees`](super::ShotTrees) compares what is asked for. `forced` are the paths that the user forces in
 /// addition to those that the scene forces; the error's build command repeats them. With `leaves`, each
 /// leaf is compared with its emitter, and the tree must have been verified.
 ///
@@ -184,12 +202,9 @@ pub fn check_fresh<D: AsRef<[u8]> + Sync>(
     forced: &[String],
     leaves: bool,
 ) -> Result<(), TreeError> {
-    let frames: Vec<i32> = tree.frames().iter().map(|row| row.frame).collect();
-    let survey = survey(scene, emitters, &frames)?;
+    let survey = survey(scene, emitters, &frames_in(tree))?;
     if survey.fingerprint != tree.fingerprint() {
-        let remedy = build_command(scene, path, &frames, forced);
-        let cause = compare(tree, &survey.lights, remedy);
-        return Err(TreeError::Stale { path: path.into(), cause });
+        return Err(stale_by(tree, path, scene, &survey, forced));
     }
     check_agreement(tree, path, scene, &survey, forced, leaves)
 }
@@ -212,12 +227,51 @@ pub fn check_agreement<D: AsRef<[u8]> + Sync>(
     }
     match find_contradiction(tree, survey, leaves) {
         None => Ok(()),
-        Some(cause) => {
-            let frames: Vec<i32> = tree.frames().iter().map(|row| row.frame).collect();
-            let remedy = build_command(scene, path, &frames, forced);
-            Err(TreeError::Contradicts { path: path.into(), cause, remedy })
-        }
+        Some(cause) => Err(contradicts(tree, path, scene, forced, cause)),
     }
+}
+
+/// What is said of a tree whose fingerprint, in the whole or in a frame, is not the scene's. Finding the
+/// lights that have changed takes a survey of all frames.
+///
+/// # Errors
+/// [`TreeError::Overflow`] if the scene has a light that no tree can hold.
+pub(super) fn stale<D: AsRef<[u8]>>(
+    tree: &LightTree<D>,
+    path: &Path,
+    scene: &Scene,
+    emitters: &Emitters,
+    forced: &[String],
+) -> Result<TreeError, TreeError> {
+    let survey = survey(scene, emitters, &frames_in(tree))?;
+    Ok(stale_by(tree, path, scene, &survey, forced))
+}
+
+fn stale_by<D: AsRef<[u8]>>(
+    tree: &LightTree<D>,
+    path: &Path,
+    scene: &Scene,
+    survey: &Survey,
+    forced: &[String],
+) -> TreeError {
+    let remedy = build_command(scene, path, &frames_in(tree), forced);
+    TreeError::Stale { path: path.into(), cause: compare(tree, &survey.lights, remedy) }
+}
+
+/// What is said of a tree that differs from its scene although it has the scene's fingerprint.
+pub(super) fn contradicts<D: AsRef<[u8]>>(
+    tree: &LightTree<D>,
+    path: &Path,
+    scene: &Scene,
+    forced: &[String],
+    cause: Contradiction,
+) -> TreeError {
+    let remedy = build_command(scene, path, &frames_in(tree), forced);
+    TreeError::Contradicts { path: path.into(), cause, remedy }
+}
+
+fn frames_in<D: AsRef<[u8]>>(tree: &LightTree<D>) -> Vec<i32> {
+    tree.frames().iter().map(|row| row.frame).collect()
 }
 
 /// The command that builds a tree again for the frames that it was built for.

@@ -8,15 +8,20 @@
 mod agreement;
 mod build;
 mod content;
+mod fingerprint;
 mod fit;
 mod forced;
 mod frames;
 mod fresh;
 mod look;
 pub mod option;
+mod render_job;
 mod rig;
+mod shot_trees;
+mod stamp;
 mod strict;
 mod survey;
+mod surveyor;
 mod textures;
 mod view;
 mod watch;
@@ -30,9 +35,14 @@ pub use fresh::{
     OpenedTree, StaleTree, TreeError, check_agreement, check_fresh, check_output, is_tree_file,
     open_base, open_tree,
 };
+pub use render_job::{
+    FrameCounts, Preview, RenderError, RenderJob, RenderReport, SceneCounts, Seconds,
+};
 pub use rig::carry_camera;
+pub use shot_trees::{ShotTrees, TreeFile};
+pub use stamp::{PreviewStamp, Stamp, Stamper};
 pub use strict::{Strict, StrictError};
-pub use survey::{Group, PlacedLight, SharedBounds, Survey, survey};
+pub use survey::{Group, PlacedLight, SharedBounds, Survey, SurveyedFrame, survey};
 pub use textures::collect_emitters;
 pub use view::{ASPECT, Look, View, ViewError, look};
 pub use watch::{Event, Watch};

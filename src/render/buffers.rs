@@ -48,6 +48,11 @@ impl RenderBuffers {
         self.window.height()
     }
 
+    /// Bytes of all values.
+    pub fn byte_length(&self) -> u64 {
+        size_of_val(self.values.as_slice()) as u64
+    }
+
     /// What is there, in the order of the channels.
     pub fn layers(&self) -> &[Layer] {
         &self.layers

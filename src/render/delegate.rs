@@ -14,22 +14,19 @@ use super::rays::RayScene;
 use super::settings::RenderSettings;
 use super::surface::Surfaces;
 use crate::emitter::{Emitters, PosedEmitters, infinite_lights};
-use crate::light_tree::{LeafTable, LightTree, NoSuchFrame};
+use crate::light_tree::{LightTree, NoSuchFrame};
 use crate::math::random::hash;
 use crate::scene::{Camera, Scene};
 use rayon::prelude::*;
 use thiserror::Error;
 
-/// After so many pixels of a row it is asked whether to stop: a row of a large picture takes long.
-const PIXELS_BETWEEN_STOPS: usize = 16;
+/// After so many samples it is asked whether to stop.
+const SAMPLES_BETWEEN_STOPS: u64 = 256;
 
-/// What does not change between the frames of a shot: geometry, textures, ray acceleration, the
-/// mapped tree.
-pub struct RenderDelegate<'a, D> {
+/// What does not change between the frames of a shot: geometry, textures, ray acceleration.
+pub struct RenderDelegate<'a> {
     scene: &'a Scene,
     emitters: &'a Emitters,
-    tree: &'a LightTree<D>,
-    static_leaves: LeafTable,
     geometry: RayScene,
     settings: RenderSettings,
     plan: Result<Plan, PlanError>,
@@ -97,24 +94,17 @@ impl Progress for () {
     fn rows_done(&self, _: u64) {}
 }
 
-impl<'a, D: AsRef<[u8]> + Sync> RenderDelegate<'a, D> {
-    /// Prepares a shot. The tree must be fresh (see `pipeline::check_fresh`).
-    ///
-    /// # Panics
-    /// If the tree has another number of emitters than the scene.
+impl<'a> RenderDelegate<'a> {
+    /// Prepares a shot.
     pub fn new(
         scene: &'a Scene,
         emitters: &'a Emitters,
-        tree: &'a LightTree<D>,
         camera: Camera,
         settings: RenderSettings,
-    ) -> RenderDelegate<'a, D> {
-        assert_eq!(tree.emitter_count(), emitters.len(), "the tree belongs to another scene");
+    ) -> RenderDelegate<'a> {
         RenderDelegate {
             scene,
             emitters,
-            tree,
-            static_leaves: tree.leaf_table(),
             geometry: RayScene::new(scene, &scene.pose_at(0.0)),
             plan: Plan::new(scene, emitters, &settings),
             settings,
@@ -128,18 +118,24 @@ impl<'a, D: AsRef<[u8]> + Sync> RenderDelegate<'a, D> {
         self.settings = settings;
     }
 
-    /// Calls `work` with a frame that is ready to be traced.
+    /// Calls `work` with a frame that is ready to be traced. The tree must be that of the scene (see
+    /// `pipeline::ShotTrees`).
     ///
     /// # Errors
     /// If the tree lacks the frame.
+    ///
+    /// # Panics
+    /// If the tree has another number of emitters than the scene.
     pub fn at_frame<T>(
         &self,
+        tree: &LightTree<impl AsRef<[u8]>>,
         frame: i32,
         work: impl FnOnce(&Integrator) -> T,
     ) -> Result<T, NoSuchFrame> {
         let pose = self.scene.pose_at(self.scene.timeline.seconds_at(f64::from(frame)));
         let infinite = infinite_lights(self.scene, &pose);
-        let tree = self.tree.at_frame(frame, &self.static_leaves)?;
+        assert_eq!(tree.emitter_count(), self.emitters.len(), "the tree belongs to another scene");
+        let tree = tree.at_frame(frame)?;
         let (width, height) = (self.settings.width, self.settings.height);
         Ok(work(&Integrator {
             settings: &self.settings,
@@ -154,19 +150,25 @@ impl<'a, D: AsRef<[u8]> + Sync> RenderDelegate<'a, D> {
         }))
     }
 
-    /// Renders one frame, or the part of it that is to be rendered. The pixels depend on scene, settings
-    /// and frame number alone; those of a part are the whole frame's.
+    /// Renders one frame, or the part of it that is to be rendered. The pixels depend on scene, tree,
+    /// settings and frame number alone; those of a part are the whole frame's.
     ///
     /// # Errors
     /// If the tree lacks the frame, the settings do not fit the scene, or `progress` stops it.
+    ///
+    /// # Panics
+    /// As [`at_frame`](Self::at_frame).
     pub fn render(
         &self,
+        tree: &LightTree<impl AsRef<[u8]>>,
         frame: i32,
         progress: &impl Progress,
     ) -> Result<RenderedFrame, RenderError> {
         let plan = self.plan.as_ref().map_err(Clone::clone)?;
-        self.at_frame(frame, |integrator| self.render_with(integrator, plan, frame, progress))?
-            .ok_or(RenderError::Stopped)
+        self.at_frame(tree, frame, |integrator| {
+            self.render_with(integrator, plan, frame, progress)
+        })?
+        .ok_or(RenderError::Stopped)
     }
 
     /// `None` if it was stopped.
@@ -218,15 +220,16 @@ impl<'a, D: AsRef<[u8]> + Sync> RenderDelegate<'a, D> {
     ) -> Option<FrameStats> {
         let (mut scratch, mut mean, mut values) =
             (PathScratch::default(), PixelMean::default(), Vec::new());
-        let mut stats = FrameStats::default();
+        let (mut stats, mut traced) = (FrameStats::default(), 0_u64);
         for (at, x) in (window.x0..window.x1).enumerate() {
-            if at % PIXELS_BETWEEN_STOPS == 0 && progress.is_stopped() {
-                return None;
-            }
             // A pixel's number is its place in the whole picture, so that a part of it has the same noise.
             let seed = hash(frame_seed, y * self.settings.width + x);
             mean.clear();
             for index in 0..self.settings.samples {
+                if traced % SAMPLES_BETWEEN_STOPS == 0 && progress.is_stopped() {
+                    return None;
+                }
+                traced += 1;
                 let sample = integrator.trace(x, y, seed, index, &mut scratch);
                 mean.add(&sample, &scratch.by_group, shown);
             }

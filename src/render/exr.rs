@@ -2,14 +2,16 @@
 //!
 //! A file has one part with ZIP-compressed scan lines and all layers of the buffers; `docs/layers.md` is
 //! the list. The data window is the part that was rendered, the display window the whole picture. The
-//! same buffers give the same bytes. Metadata is one JSON text in the attribute [`METADATA`];
-//! Cryptomatte has attributes of its own.
+//! same buffers give the same bytes. Metadata is one JSON text in the attribute [`METADATA`],
+//! with a [seal](crate::store::set_seal): a file with rot anywhere is not taken for the picture that was
+//! written. Cryptomatte has attributes of its own.
 
+use super::beauty::half;
 use super::buffers::RenderBuffers;
 use super::cryptomatte;
 use super::exr_header::sort_attributes;
 use super::layers::SampleType;
-use crate::store::{open_regular, write_atomically};
+use crate::store::{BLANK, is_sealed, read_regular, set_seal, write_atomically};
 use exr::block::reader::Reader;
 use exr::block::writer::ChunksWriter;
 use exr::block::{BlockIndex, UncompressedBlock};
@@ -17,31 +19,33 @@ use exr::compression::Compression;
 use exr::meta::attribute::{AttributeValue, ChannelDescription, IntegerBounds, LineOrder, Text};
 use exr::meta::header::{Header, LayerAttributes};
 use exr::meta::{BlockDescription, MetaData};
-use exr::prelude::{SmallVec, Vec2, f16};
-use std::fs::File;
-use std::io::{self, BufReader, BufWriter, Write};
+use exr::prelude::{SmallVec, Vec2};
+use std::io::{self, Cursor, Write};
 use std::path::Path;
 
 /// Name of the attribute that holds the JSON text.
 pub const METADATA: &str = "candelabra";
 
-/// Writes a frame, all or nothing. `metadata` is a JSON text.
+/// Larger files are none of ours.
+const MOST_BYTES: u64 = 64 << 30;
+
+/// Writes a frame, all or nothing, and seals it. `metadata` is a JSON object. Returns the length of the file.
 ///
 /// The buffers need not be those of the frame that is being rendered: another thread may write them
 /// meanwhile.
-pub fn write_exr(path: &Path, buffers: &RenderBuffers, metadata: &str) -> io::Result<()> {
-    write_atomically(path, |file| {
-        write_to(file, buffers, metadata)?;
-        file.flush()?;
-        sort_attributes(file.get_mut())
-    })
+pub fn write_exr(path: &Path, buffers: &RenderBuffers, metadata: &str) -> io::Result<u64> {
+    let mut bytes = encode(buffers, &with_seal(metadata))?;
+    set_seal(&mut bytes);
+    write_atomically(path, |file| file.write_all(&bytes))?;
+    Ok(bytes.len() as u64)
 }
 
-fn write_to(file: &mut BufWriter<File>, buffers: &RenderBuffers, metadata: &str) -> io::Result<()> {
+fn encode(buffers: &RenderBuffers, metadata: &str) -> io::Result<Vec<u8>> {
+    let mut file = Cursor::new(Vec::new());
     let channels = Channels::of(buffers);
     let header = header(buffers, &channels, metadata);
     let headers = SmallVec::from_elem(header, 1);
-    exr::block::write(file, headers, true, |meta, chunks| {
+    exr::block::write(&mut file, headers, true, |meta, chunks| {
         let blocks = meta.collect_ordered_blocks(|index| channels.block(&meta, index));
         let chunks = chunks.on_progress(|_| ());
         // Crate exr starts threads of its own, as many as there are cores.
@@ -50,26 +54,27 @@ fn write_to(file: &mut BufWriter<File>, buffers: &RenderBuffers, metadata: &str)
             _ => chunks.compress_all_blocks_parallel(&meta, blocks),
         }
     })
-    .map_err(into_io)
+    .map_err(into_io)?;
+    sort_attributes(&mut file)?;
+    Ok(file.into_inner())
 }
 
-/// The JSON text of a file that [`write_exr`] made, if the file is whole. `None` if it is not there,
-/// is no such file, or ends early. Reads the header and the last rows, not the picture.
+/// The JSON text of a file that [`write_exr`] made, if every byte of the file is as it was written. `None`
+/// if it is not there or is no such file.
 pub fn read_metadata(path: &Path) -> Option<String> {
-    let reader =
-        Reader::read_from_buffered(BufReader::new(open_regular(path).ok()?), false).ok()?;
-    let header = reader.headers().first()?;
-    let attribute = header.own_attributes.other.get(METADATA.as_bytes())?;
+    let bytes = read_regular(path, MOST_BYTES).ok()?;
+    let reader = Reader::read_from_buffered(Cursor::new(&bytes), false).ok()?;
+    let attribute = reader.headers().first()?.own_attributes.other.get(METADATA.as_bytes())?;
     let AttributeValue::Text(text) = attribute else { return None };
     let text = text.to_string();
-    // Rows are stored from the top: the file is whole if its last block is.
-    let height = header.layer_size.height();
-    let is_last = |_: &_, _, block: exr::block::BlockIndex| {
-        block.pixel_position.y() + block.pixel_size.height() >= height
-    };
-    let mut blocks = reader.filter_chunks(true, is_last).ok()?;
-    blocks.try_for_each(|block| block.map(drop)).ok()?;
-    Some(text)
+    is_sealed(bytes).then_some(text)
+}
+
+/// A JSON object with a blank seal as its first member.
+fn with_seal(metadata: &str) -> String {
+    let members = metadata.trim_start().strip_prefix('{').unwrap_or("}").trim_start();
+    let comma = if members.starts_with('}') { "" } else { "," };
+    format!("{{\"seal\":\"{BLANK}\"{comma}{members}")
 }
 
 fn header(buffers: &RenderBuffers, channels: &Channels, metadata: &str) -> Header {
@@ -134,12 +139,6 @@ impl Channels<'_> {
             written.expect("a line has room for its samples");
         })
     }
-}
-
-/// The nearest of the numbers that 16 bits hold.
-fn half(value: f32) -> f16 {
-    let largest = f32::from(f16::MAX);
-    f16::from_f32(value.clamp(-largest, largest))
 }
 
 /// The same JSON with non-ASCII characters escaped: an EXR text has one byte per character.
@@ -226,8 +225,7 @@ mod tests {
         buffers.set(3, 0, &[1e6, f32::INFINITY, 2049.0, 0.1]);
         write_exr(&path, &buffers, "{}").unwrap();
         let at_3 = channels(&path).into_iter().map(|(name, values)| (name, values[3]));
-        let expected =
-            [("A", f32::from(f16::from_f32(0.1))), ("B", 2048.0), ("G", 65504.0), ("R", 65504.0)];
+        let expected = [("A", half(0.1).to_f32()), ("B", 2048.0), ("G", 65504.0), ("R", 65504.0)];
         assert!(at_3.eq(expected.map(|(name, value)| (name.to_string(), value))));
     }
 

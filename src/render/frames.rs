@@ -47,6 +47,11 @@ pub enum FramesError {
 }
 
 impl Frames {
+    /// A single frame.
+    pub fn one(frame: i32) -> Frames {
+        Frames(vec![frame])
+    }
+
     /// The frames, in order; at least one.
     pub fn as_slice(&self) -> &[i32] {
         &self.0

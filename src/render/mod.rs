@@ -18,9 +18,10 @@
 //! | `pixel`, `parts` | what do a pixel's samples come to? |
 //! | `motion`, `cryptomatte` | where does it move, and what is it? |
 //! | [`buffers`] | where is it all kept? |
-//! | [`exr`], [`png`] | how does it get to the disk? |
+//! | [`exr`], [`beauty`], [`png`] | how does it get to the disk? |
 //! | [`frames`], [`frame_names`] | which frames, and under which names? |
 
+pub mod beauty;
 pub mod bsdf;
 pub mod buffers;
 pub mod camera;

@@ -31,6 +31,7 @@ mod note;
 mod pose;
 mod posing;
 mod requirements;
+mod source_file;
 mod steady;
 mod texture;
 mod timeline;
@@ -46,6 +47,7 @@ pub use note::{Category, Note};
 pub use pose::{Channel, Interpolation, Keys, Node, Pose, Trs};
 pub use posing::Posing;
 pub use requirements::Requirements;
+pub use source_file::SourceFile;
 pub use texture::{Pixels, Texture, TextureUse, Wrap};
 pub use timeline::Timeline;
 pub use visibility::Visibility;
@@ -59,8 +61,8 @@ use std::path::PathBuf;
 pub struct Scene {
     /// The file this scene was read from, for messages.
     pub source: PathBuf,
-    /// That file and every file that was read because it refers to it.
-    pub files: Vec<PathBuf>,
+    /// That file, and every file that was read because it refers to it, as they were read.
+    pub files: Vec<SourceFile>,
     /// The transform hierarchy. A parent stands before its children.
     pub nodes: Vec<Node>,
     /// Triangle meshes, one material each.

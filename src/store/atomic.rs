@@ -7,16 +7,20 @@
 //!
 //! Of two writers of one name the last to finish wins. A writer that is killed (`kill -9`, a machine that
 //! stops) cannot clean up: its temporary file, `.candelabra-*.part` in the output's folder, stays. Nothing
-//! reads it and no later writer takes its name. Such files may be removed once they are older than any
-//! job that runs.
+//! reads it and no later writer takes its name. Writers hold a lock on their temporary files, which the
+//! system drops when they die; so [`sweep`] can tell the files that nobody writes any more, and removes them.
 //!
 //! Long work should not fail only when its output is written: [`check_writable`] tests beforehand, as far
 //! as possible, whether that will succeed.
 
-use std::fs::{self, File};
+use std::fs::{self, File, TryLockError};
 use std::io::{self, BufWriter, Write};
 use std::path::Path;
-use tempfile::Builder;
+use tempfile::{Builder, NamedTempFile};
+
+/// How temporary files are named.
+const PREFIX: &str = ".candelabra-";
+const SUFFIX: &str = ".part";
 
 /// Writes a file through `write`, all or nothing. Parent folders are created.
 ///
@@ -38,18 +42,23 @@ pub fn write_atomically(
     })
 }
 
-/// Checks that a file can be written: no folder or device has its name, and a temporary file can be
-/// created in its folder or, if that does not exist, in the nearest one above that does. Nothing is left
-/// behind. Errors name the path and the remedy.
+/// Checks that a small file can be written; see [`check_room`].
 pub fn check_writable(path: &Path) -> io::Result<()> {
-    check(path).map_err(|error| {
+    check_room(path, 1)
+}
+
+/// Checks that a file of some bytes can be written: no folder or device has its name, and a temporary file
+/// of that length can be written in its folder or, if that does not exist, in the nearest one above that
+/// does. Nothing is left behind. Errors name the path and the remedy.
+pub fn check_room(path: &Path, bytes: u64) -> io::Result<()> {
+    check(path, bytes).map_err(|error| {
         let problem =
             format!("{}: cannot be written: {error}; choose another output", path.display());
         io::Error::new(error.kind(), problem)
     })
 }
 
-fn check(path: &Path) -> io::Result<()> {
+fn check(path: &Path, bytes: u64) -> io::Result<()> {
     match fs::metadata(path) {
         Ok(there) if there.is_dir() => {
             return Err(io::Error::new(io::ErrorKind::IsADirectory, "it is a folder"));
@@ -64,24 +73,58 @@ fn check(path: &Path) -> io::Result<()> {
     while fs::symlink_metadata(folder).is_err() && folder != Path::new(".") {
         folder = folder_of(folder);
     }
-    temporary_file().tempfile_in(folder).map(drop)
+    let mut temporary = temporary_file(folder)?;
+    io::copy(&mut io::Read::take(io::repeat(0), bytes), &mut temporary)?;
+    temporary.flush()
+}
+
+/// Removes the temporary files in a folder that killed writers have left. Those of writers that live, on
+/// this machine or, if the file system's locks reach that far, on another, stay. Errors are ignored: the
+/// files are in nobody's way.
+pub fn sweep(folder: &Path) {
+    let Ok(entries) = fs::read_dir(folder) else { return };
+    for path in entries.flatten().map(|entry| entry.path()) {
+        let name = path.file_name().and_then(|name| name.to_str()).unwrap_or_default();
+        let is_file = || fs::symlink_metadata(&path).is_ok_and(|there| there.is_file());
+        if !(name.starts_with(PREFIX) && name.ends_with(SUFFIX) && is_file()) {
+            continue;
+        }
+        // Locked until it is removed: a writer that comes late sees that it has lost the file.
+        if let Ok(file) = File::open(&path)
+            && file.try_lock().is_ok()
+        {
+            let _ = fs::remove_file(&path);
+        }
+    }
 }
 
 /// The folder that a file belongs in.
-fn folder_of(path: &Path) -> &Path {
+pub fn folder_of(path: &Path) -> &Path {
     match path.parent() {
         Some(folder) if !folder.as_os_str().is_empty() => folder,
         _ => Path::new("."),
     }
 }
 
-fn temporary_file() -> Builder<'static, 'static> {
+/// A temporary file in a folder, locked.
+fn temporary_file(folder: &Path) -> io::Result<NamedTempFile> {
     let mut builder = Builder::new();
-    builder.prefix(".candelabra-").suffix(".part");
+    builder.prefix(PREFIX).suffix(SUFFIX);
     // A temporary file is private by default; an output is as open as the user's mask allows.
     #[cfg(unix)]
     builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-    builder
+    /// A sweeper may come between the making of a file and its lock, but not many times in a row.
+    const TRIES: u32 = 8;
+    for _ in 0..TRIES {
+        let temporary = builder.tempfile_in(folder)?;
+        match temporary.as_file().try_lock() {
+            Ok(()) if fs::symlink_metadata(temporary.path()).is_ok() => return Ok(temporary),
+            // No locks on this file system; then nobody sweeps it either.
+            Err(TryLockError::Error(_)) => return Ok(temporary),
+            Ok(()) | Err(TryLockError::WouldBlock) => {}
+        }
+    }
+    Err(io::Error::other("another program removes temporary files as fast as they are made"))
 }
 
 fn replace(
@@ -90,14 +133,14 @@ fn replace(
 ) -> io::Result<()> {
     let folder = folder_of(path);
     fs::create_dir_all(folder)?;
-    let temporary = temporary_file().tempfile_in(folder)?;
-    let (file, name) = temporary.into_parts();
+    let (file, name) = temporary_file(folder)?.into_parts();
     let mut buffer = BufWriter::new(file);
     write(&mut buffer)?;
     buffer.flush()?;
     buffer.get_ref().sync_all()?;
-    drop(buffer);
+    // Open, and so locked, until it has its own name.
     name.persist(path)?;
+    drop(buffer);
     // The rename itself lives in the folder. Not every system lets a folder be opened; the file is
     // whole either way.
     if let Ok(folder) = File::open(folder) {
@@ -169,6 +212,42 @@ mod tests {
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 2);
         assert_eq!(fs::read_to_string(path("file")).unwrap(), "old");
         assert_eq!(fs::read_dir(path("taken")).unwrap().count(), 0);
+    }
+
+    #[test]
+    fn what_dead_writers_left_is_swept_and_what_lives_stays() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = |name: &str| folder.path().join(name);
+        for name in [".candelabra-dead.part", ".candelabra-x", "a.part", "candelabra-y.part"] {
+            fs::write(path(name), "half").unwrap();
+        }
+        fs::create_dir(path(".candelabra-folder.part")).unwrap();
+        let alive = temporary_file(folder.path()).unwrap();
+        sweep(folder.path());
+        assert!(!path(".candelabra-dead.part").exists());
+        assert!(alive.path().exists());
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 5);
+        sweep(&path("no such folder"));
+    }
+
+    /// Two writers and a sweeper on one folder: every file is written whole, nothing stays.
+    #[test]
+    fn a_sweeper_takes_nothing_from_writers() {
+        let folder = tempfile::tempdir().unwrap();
+        let write = &|name: &str| {
+            for _ in 0..200 {
+                let path = folder.path().join(name);
+                write_atomically(&path, |file| file.write_all(name.as_bytes())).unwrap();
+                assert_eq!(fs::read_to_string(&path).unwrap(), name);
+            }
+        };
+        std::thread::scope(|scope| {
+            let writers = ["a", "b"].map(|name| scope.spawn(move || write(name)));
+            while !writers.iter().all(|writer| writer.is_finished()) {
+                sweep(folder.path());
+            }
+        });
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 2);
     }
 
     #[cfg(unix)]

@@ -297,6 +297,11 @@ impl<D: AsRef<[u8]>> Container<D> {
         self.data
     }
 
+    /// What holds the bytes.
+    pub fn data(&self) -> &D {
+        &self.data
+    }
+
     /// All bytes.
     pub fn bytes(&self) -> &[u8] {
         self.data.as_ref()

@@ -2,28 +2,123 @@
 #![allow(unsafe_code)]
 
 use super::open_regular;
-use memmap2::{Advice, Mmap};
+use memmap2::Mmap;
+use std::fs::File;
 use std::io;
 use std::path::Path;
+use std::time::SystemTime;
 
-/// Maps a file read-only.
+/// A file, mapped read-only.
 ///
 /// Our writers never change a file in place: they write another and rename it over the old one, so
 /// a mapping keeps seeing the file that it was made of, whole, for as long as it is used.
 ///
 /// Other programs may change it in place: `cp` over a tree, `rsync --inplace`, an editor. What was
-/// verified may then no longer hold; sampling survives that, with wrong numbers. But if the file gets
-/// *shorter*, or its disk fails, the system ends the process with `SIGBUS` when it reads the missing part.
-/// That is not caught: a handler could neither read the rest nor unwind from here. Finished frames are not
-/// lost, because pictures are written whole or not at all; start the render again with `--resume`. To
+/// verified may then no longer hold; sampling survives that, with wrong numbers, and
+/// [`is_unchanged`](MappedFile::is_unchanged) tells. But if the file gets *shorter*, or its disk fails, the
+/// system ends the process with `SIGBUS` when it reads the missing part: nothing here can prevent that. To
 /// replace a tree safely, copy the new one to another name and `mv` it over the old one.
-pub fn map(path: &Path) -> io::Result<Mmap> {
-    let file = open_regular(path)?;
-    // SAFETY: the mapping is undefined if another process truncates or overwrites the file while
-    // we read. No tool of ours does (see above). All types viewed in the bytes are `Pod`, so that
-    // foreign writes could at worst give wrong numbers, which sampling survives by construction.
-    let map = unsafe { Mmap::map(&file) }?;
-    // Trees are small and read whole: fetch ahead rather than fault page by page.
-    let _ = map.advise(Advice::WillNeed);
-    Ok(map)
+pub struct MappedFile {
+    map: Mmap,
+    file: File,
+    state: io::Result<State>,
+}
+
+/// What changes when a file is written to.
+#[derive(PartialEq, Eq)]
+struct State {
+    length: u64,
+    modified: SystemTime,
+    /// How many names it has, and when it was changed in any way: also by taking a name away.
+    #[cfg(unix)]
+    inode: (u64, i64, i64),
+}
+
+impl State {
+    fn of(file: &File) -> io::Result<State> {
+        let now = file.metadata()?;
+        #[cfg(unix)]
+        use std::os::unix::fs::MetadataExt;
+        Ok(State {
+            length: now.len(),
+            modified: now.modified()?,
+            #[cfg(unix)]
+            inode: (now.nlink(), now.ctime(), now.ctime_nsec()),
+        })
+    }
+
+    /// Whether nobody has written to the file in between. That it got or lost a name does not matter.
+    fn is_same(&self, other: &State) -> bool {
+        #[cfg(unix)]
+        if self.inode.0 == other.inode.0 {
+            return self == other;
+        }
+        (self.length, self.modified) == (other.length, other.modified)
+    }
+}
+
+impl MappedFile {
+    /// Maps a file.
+    ///
+    /// # Errors
+    /// If it is no regular file, or cannot be mapped.
+    pub fn open(path: &Path) -> io::Result<MappedFile> {
+        let file = open_regular(path)?;
+        let state = State::of(&file);
+        // SAFETY: the mapping is undefined if another process truncates or overwrites the file while
+        // we read. No tool of ours does (see above). All types viewed in the bytes are `Pod`, so that
+        // foreign writes could at worst give wrong numbers, which sampling survives by construction.
+        let map = unsafe { Mmap::map(&file) }?;
+        Ok(MappedFile { map, file, state })
+    }
+
+    /// Whether nobody has written to the file since it was mapped, as far as its length and times tell.
+    pub fn is_unchanged(&self) -> bool {
+        match (&self.state, State::of(&self.file)) {
+            (Ok(then), Ok(now)) => then.is_same(&now),
+            _ => false,
+        }
+    }
+}
+
+impl AsRef<[u8]> for MappedFile {
+    fn as_ref(&self) -> &[u8] {
+        &self.map
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::fs;
+
+    #[test]
+    fn a_mapped_file_notices_who_writes_to_it_and_not_who_replaces_it() {
+        let folder = tempfile::tempdir().unwrap();
+        let (path, other) = (folder.path().join("a"), folder.path().join("b"));
+        let mapped = |content: &str| {
+            fs::write(&path, content).unwrap();
+            MappedFile::open(&path).unwrap()
+        };
+        let pause = || std::thread::sleep(std::time::Duration::from_millis(20));
+        let replaced = mapped("first");
+        pause();
+        fs::write(&other, "later").unwrap();
+        fs::rename(&other, &path).unwrap();
+        assert!(replaced.is_unchanged() && replaced.as_ref() == b"first");
+        // Of the same length; of another.
+        for content in ["FIRST", "longer"] {
+            let written = mapped("first");
+            assert!(written.is_unchanged());
+            pause();
+            fs::OpenOptions::new().write(true).open(&path).unwrap();
+            assert!(written.is_unchanged());
+            io::Write::write_all(
+                &mut fs::OpenOptions::new().write(true).open(&path).unwrap(),
+                content.as_bytes(),
+            )
+            .unwrap();
+            assert!(!written.is_unchanged(), "{content}");
+        }
+    }
 }

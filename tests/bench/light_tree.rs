@@ -79,8 +79,7 @@ fn benchmarks(criterion: &mut Criterion) {
     group.bench_function("open", |b| b.iter(|| open_tree(&path, false).unwrap()));
 
     let tree = LightTree::open(bytes).unwrap();
-    let leaves = tree.leaf_table();
-    let frame = tree.at_frame(0, &leaves).unwrap();
+    let frame = tree.at_frame(0).unwrap();
     // Receivers of a picture: neighbours in space, as paths visit them.
     let receiver = |i: u32| Receiver {
         point: Vec3::new(random(i >> 10, 0), 0.0, random(i >> 10, 1)) * 100.0
@@ -107,8 +106,7 @@ fn benchmarks(criterion: &mut Criterion) {
         });
     });
     let mapped = open_tree(&path, true).unwrap();
-    let mapped_leaves = mapped.leaf_table();
-    let mapped_frame = mapped.at_frame(0, &mapped_leaves).unwrap();
+    let mapped_frame = mapped.at_frame(0).unwrap();
     group.bench_function("one pick from a mapped file, one thread", |b| {
         b.iter(|| {
             next += 1;

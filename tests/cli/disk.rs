@@ -161,5 +161,5 @@ fn a_reader_keeps_the_file_that_it_has_mapped() {
     assert_eq!(shot.read("shot.ltree"), trees[1]);
     // Nothing of it has been looked at but the header.
     mapped.verify().unwrap();
-    assert!(mapped.into_bytes()[..] == trees[0]);
+    assert!(mapped.data().as_ref() == trees[0]);
 }

@@ -1,5 +1,6 @@
 //! The two programs, as a pipeline TD and a farm use them.
 
+mod alone;
 mod build;
 mod diff;
 mod disk;

@@ -92,7 +92,8 @@ fn no_name_reaches_a_terminal_as_it_is() {
         assert_plain(&told.err, arguments);
     }
     // The paths themselves are as the file has them.
-    let tree = LightTree::open(candelabra::store::map(&shot.path("a.ltree")).unwrap()).unwrap();
+    let tree = LightTree::open(candelabra::store::MappedFile::open(&shot.path("a.ltree")).unwrap())
+        .unwrap();
     assert!(tree.light_path(&tree.lights()[0]).contains('\u{202e}'));
     let mut shot = evil(0.0);
     shot.edit(|json| json["extensionsRequired"] = json!([EVIL]));

@@ -170,8 +170,8 @@ fn what_cannot_be_written_is_refused_before_anything_is_rendered() {
     assert_eq!(shot.names(), ["file", "look.png", SCENE, "taken.exr"]);
     // One frame of several is said at its turn, and not rendered either.
     std::fs::create_dir(shot.path("b.2.exr")).unwrap();
-    let told = shot.render("-o b.#.exr --frames 1-3").ends(1).says("frame 2: failed: b.2.exr");
-    told.says("b.1.exr").says("b.3.exr");
+    let told = shot.render("-o b.#.exr --frames 1-3").ends(1).says("b.1.exr").says("b.3.exr");
+    told.complains(&["frame 2: failed: b.2.exr"]);
     // A shot that is done needs no writing.
     let done = "-o still.exr --resume";
     shot.render(done).ends(0);
@@ -184,14 +184,14 @@ fn one_bad_frame_does_not_stop_the_others() {
     shot.candelabra(&format!("build {SCENE} --frames 1,3,5")).ends(0);
     shot.render("--tree shot.ltree --frames 1-5 -o a.#.exr")
         .ends(1)
-        .says("frame 2: failed: the tree has no frame 2")
-        .says("frame 4: failed")
-        .says("--frames")
+        .complains(&["frame 2: failed", "shot.ltree", "the tree has no frame 2", "--frames"])
+        .complains(&["frame 4: failed"])
         .complains(&["2 frames failed; any others are done"]);
     assert_eq!(shot.names(), ["a.1.exr", "a.3.exr", "a.5.exr", SCENE, "shot.ltree"]);
     // A folder in the way of one picture.
     std::fs::create_dir(shot.path("b.3.exr")).unwrap();
-    shot.render("--tree shot.ltree --frames 1,3,5 -o b.#.exr").ends(1).says("frame 3: failed");
+    let told = shot.render("--tree shot.ltree --frames 1,3,5 -o b.#.exr").ends(1);
+    told.complains(&["frame 3: failed"]);
     assert!(is_picture(&shot.path("b.1.exr")) && is_picture(&shot.path("b.5.exr")));
     assert!(shot.names().iter().all(|name| !name.contains(".part")), "{:?}", shot.names());
 }

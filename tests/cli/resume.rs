@@ -48,16 +48,73 @@ fn broken_pictures_are_rendered_again() {
     assert_rendered(&shot, SHOT, &[2]);
 }
 
+/// Previews are made of what the picture keeps, so that one made later is the one made at once.
 #[test]
-fn a_missing_preview_is_made() {
+fn a_preview_that_is_missing_or_not_of_the_picture_is_made_without_rendering() {
     let shot = Shot::moving();
-    assert_rendered(&shot, SHOT, &[1, 2]);
-    let with_previews = format!("{SHOT} --png --exposure 0");
-    assert_rendered(&shot, &with_previews, &[1, 2]);
-    assert_rendered(&shot, &with_previews, &[]);
-    std::fs::remove_file(shot.path("a.1.png")).unwrap();
-    assert_rendered(&shot, &with_previews, &[1]);
-    assert!(shot.path("a.1.png").exists());
+    for float in ["", " --float"] {
+        let with_previews = format!("{SHOT} --png{float}");
+        assert_rendered(&shot, &format!("{with_previews} --seed 1"), &[1, 2]);
+        let other = shot.read("a.1.png");
+        assert_rendered(&shot, &with_previews, &[1, 2]);
+        let at_once = shot.read("a.1.png");
+        assert!(at_once != other);
+        assert_rendered(&shot, &with_previews, &[]);
+        std::fs::remove_file(shot.path("a.1.png")).unwrap();
+        assert_rendered(&shot, &with_previews, &[]);
+        assert!(shot.read("a.1.png") == at_once);
+        // That of another picture, and one with rot in it.
+        let mut rotten = at_once.clone();
+        rotten[at_once.len() / 2] ^= 1;
+        for wrong in [&other, &rotten, &at_once[..40].to_vec()] {
+            shot.write("a.1.png", wrong);
+            assert_rendered(&shot, &with_previews, &[]);
+            assert!(shot.read("a.1.png") == at_once);
+        }
+        // Of another exposure, there and back.
+        let brighter = format!("{with_previews} --exposure 3");
+        assert_rendered(&shot, &brighter, &[]);
+        assert!(shot.read("a.1.png") != at_once);
+        assert_rendered(&shot, &with_previews, &[]);
+        assert!(shot.read("a.1.png") == at_once);
+    }
+}
+
+/// What is written does not depend on which frames a process renders.
+#[test]
+fn a_shot_in_chunks_is_the_shot() {
+    let mut shot = Shot::moving();
+    // It gets darker from frame to frame, so that each frame alone would choose another exposure.
+    shot.edit(|json| {
+        json["animations"][0]["channels"][0]["target"]["path"] = json!("scale");
+    });
+    shot.render("--frames 1-4 -o whole.#.exr --png").ends(0);
+    for frames in ["4", "2-3", "1"] {
+        shot.render(&format!("--frames {frames} -o part.#.exr --png")).ends(0);
+    }
+    for name in (1..=4).flat_map(|frame| [format!("{frame}.exr"), format!("{frame}.png")]) {
+        assert!(
+            shot.read(&format!("whole.{name}")) == shot.read(&format!("part.{name}")),
+            "{name}"
+        );
+    }
+}
+
+#[test]
+fn rot_anywhere_in_a_picture_is_noticed() {
+    let shot = Shot::still();
+    let arguments = "--resume --float --res 64x64 -o a.exr";
+    shot.render(arguments).ends(0);
+    let whole = shot.read("a.exr");
+    for part in 1..6 {
+        let mut rotten = whole.clone();
+        let from = whole.len() * part / 6;
+        rotten[from..from + 40].fill(0);
+        shot.write("a.exr", rotten);
+        shot.render(arguments).ends(0).keeps_quiet_about("up to date");
+        assert!(shot.read("a.exr") == whole);
+    }
+    shot.render(arguments).ends(0).says("up to date");
 }
 
 #[test]

@@ -60,10 +60,9 @@ struct Sample {
 
 /// A few picks in every frame, of forced lights too.
 fn samples(tree: &OpenedTree) -> Vec<Sample> {
-    let table = tree.leaf_table();
     let mut samples = Vec::new();
     for frame in 1..=3 {
-        let sampled = tree.at_frame(frame, &table).unwrap();
+        let sampled = tree.at_frame(frame).unwrap();
         for (point, normal) in [(Vec3::ZERO, Vec3::Y), (Vec3::new(-3.0, 0.0, 2.0), Vec3::ZERO)] {
             let receiver = Receiver { point, normal };
             let picks = (0..4).map(|i| sampled.sample(&receiver, (f64::from(i) + 0.5) / 4.0));

@@ -111,8 +111,7 @@ fn a_sound_tree_of_any_depth_is_walked() {
     parts.set("TREE", 16 + 12, 1f32.to_bits());
     let tree = LightTree::open(parts.file()).unwrap();
     assert_eq!(tree.verify(), Ok(()));
-    let table = tree.leaf_table();
-    let frame = tree.at_frame(0, &table).unwrap();
+    let frame = tree.at_frame(0).unwrap();
     let receiver = Receiver { point: Vec3::ZERO, normal: Vec3::ZERO };
     assert!(frame.sample(&receiver, 0.999_999).is_some());
     let last = frame.probability(&receiver, DEPTH);

@@ -70,10 +70,9 @@ pub fn report<D: AsRef<[u8]>>(tree: &LightTree<D>) -> Report {
         [] => vec![None],
         frames => frames.iter().map(|row| Some(row.frame)).collect(),
     };
-    let table = tree.leaf_table();
     let receiver = Receiver { point: Vec3::ZERO, normal: Vec3::ZERO };
     let frame = |number: Option<i32>| {
-        let sampled = tree.at_frame(number.unwrap_or(0), &table).unwrap();
+        let sampled = tree.at_frame(number.unwrap_or(0)).unwrap();
         let mut leaves = Vec::new();
         sampled.for_each_leaf(&receiver, |emitter, _, energy| leaves.push((emitter, energy)));
         leaves.sort_by_key(|&(emitter, _)| emitter);

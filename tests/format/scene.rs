@@ -166,9 +166,8 @@ fn every_strategy_survives_what_nobody_verified() {
                 ..Default::default()
             };
             let camera = owner.scene.cameras[0].clone();
-            let delegate =
-                RenderDelegate::new(&owner.scene, &owner.emitters, &tree, camera, settings);
-            rendered += usize::from(delegate.render(1 + round as i32 % 3, &()).is_ok());
+            let delegate = RenderDelegate::new(&owner.scene, &owner.emitters, camera, settings);
+            rendered += usize::from(delegate.render(&tree, 1 + round as i32 % 3, &()).is_ok());
         }
         assert!(rendered > 500, "{rendered}");
     }

@@ -249,8 +249,7 @@ proptest! {
             forced: Vec::new(),
         };
         let tree = city.tree();
-        let table = tree.leaf_table();
-        let frame = tree.at_frame(1, &table).unwrap();
+        let frame = tree.at_frame(1).unwrap();
         let probability = for_viewer!(viewer, |viewer| frame.probability(&viewer, 0));
         prop_assert!(probability == 1.0, "{viewer:?}: {probability}");
     }

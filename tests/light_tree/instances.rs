@@ -14,8 +14,7 @@ use glam::{Affine3A, Vec3};
 use proptest::prelude::*;
 
 fn with_frame<T>(tree: &Tree, frame: i32, check: impl FnOnce(&FrameTree) -> T) -> T {
-    let table = tree.leaf_table();
-    check(&tree.at_frame(frame, &table).unwrap())
+    check(&tree.at_frame(frame).unwrap())
 }
 
 /// The row of the tree that frame 1 samples.

@@ -33,8 +33,7 @@ impl Worst {
     pub fn of(bounds: &[LightBounds], receivers: &[Receiver]) -> Worst {
         let tree = tree_over(bounds);
         assert_eq!(tree.verify(), Ok(()));
-        let table = tree.leaf_table();
-        let frame = tree.at_frame(0, &table).unwrap();
+        let frame = tree.at_frame(0).unwrap();
         let depth = 1 + nodes(&tree).into_iter().map(|(_, depth)| depth).max().unwrap();
         let mut worst = Worst { lights: bounds.len(), depth, ..Worst::default() };
         for receiver in receivers {

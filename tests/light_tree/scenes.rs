@@ -117,8 +117,7 @@ fn triangles_without_area_leave_the_light_to_those_with_one() {
     let survey = pipeline::survey(&scene, &emitters, &[]).unwrap();
     let tree = LightTree::open(pipeline::build_tree(&survey)).unwrap();
     assert_eq!(tree.verify(), Ok(()));
-    let table = tree.leaf_table();
-    let frame = tree.at_frame(0, &table).unwrap();
+    let frame = tree.at_frame(0).unwrap();
     // Below the triangles, which face down.
     let receiver = Receiver { point: Vec3::new(0.2, 0.2, 0.0), normal: Vec3::Z };
     let shares: Vec<f64> =

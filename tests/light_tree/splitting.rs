@@ -184,8 +184,7 @@ proptest! {
         city in city(), viewer in any_viewer(), beside in beside(), how in splitting()
     ) {
         let tree = city.tree();
-        let table = tree.leaf_table();
-        let frame = tree.at_frame(1, &table).unwrap();
+        let frame = tree.at_frame(1).unwrap();
         for_viewer!(viewer, |v| picks_are_sound(&frame, &v, &beside, &how))?;
     }
 
@@ -223,8 +222,7 @@ proptest! {
         city in city(), viewer in any_viewer(), beside in beside(), u in 0f64..1.0
     ) {
         let tree = city.tree();
-        let table = tree.leaf_table();
-        let frame = tree.at_frame(1, &table).unwrap();
+        let frame = tree.at_frame(1).unwrap();
         for_viewer!(viewer, |v| {
             let mut found = picks(&frame, &v, &beside, &Splitting::ALL, (u, 5));
             for pick in &found {
@@ -265,8 +263,7 @@ proptest! {
         salt in any::<u32>()
     ) {
         let tree = city.tree();
-        let table = tree.leaf_table();
-        let frame = tree.at_frame(1, &table).unwrap();
+        let frame = tree.at_frame(1).unwrap();
         for_viewer!(viewer, |v| counts_are_expected(&frame, &v, &beside, &how, salt))?;
     }
 

@@ -127,8 +127,7 @@ pub fn dead_probability(tree: &Tree, receiver: &Receiver) -> f64 {
 /// Runs `check` on the tree of the only frame.
 pub fn with_tree<T>(bounds: &[LightBounds], check: impl FnOnce(&FrameTree) -> T) -> T {
     let tree = tree_over(bounds);
-    let table = tree.leaf_table();
-    check(&tree.at_frame(0, &table).unwrap())
+    check(&tree.at_frame(0).unwrap())
 }
 
 /// The probability of each emitter.

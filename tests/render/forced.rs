@@ -124,8 +124,7 @@ fn a_forced_light_is_never_among_the_picks_and_always_beside_them() {
     force_lights(&mut stage.scene, &paths).unwrap();
     let set = Set::of(&stage.scene, &[FRAME]);
     let is_forced = |emitter: u32| paths.contains(&set.emitters.light_of(emitter).path);
-    let table = set.tree.leaf_table();
-    let tree = set.tree.at_frame(FRAME, &table).unwrap();
+    let tree = set.tree.at_frame(FRAME).unwrap();
     // A sun and a dome are in no tree.
     assert_eq!(tree.forced_count(), paths.len() - 2);
     let forced = (0..set.emitters.len() as u32).filter(|&emitter| is_forced(emitter));
@@ -172,8 +171,8 @@ fn a_forced_sun_is_sampled_beside_the_pick() {
         let set = stage.set();
         let settings = RenderSettings { split: 0.0, ..direct(4, 16) };
         let camera = stage.scene.cameras[0].clone();
-        let delegate = RenderDelegate::new(set.scene, &set.emitters, &set.tree, camera, settings);
-        let seen = delegate.render(1, &()).unwrap();
+        let delegate = RenderDelegate::new(set.scene, &set.emitters, camera, settings);
+        let seen = delegate.render(&set.tree, 1, &()).unwrap();
         let covered: f32 = pixels(&seen.buffers).iter().map(|pixel| pixel.alpha * 16.0).sum();
         assert!(covered > 200.0);
         assert_eq!(seen.stats.trace.light_picks, picks * covered as u64, "forced: {forced}");

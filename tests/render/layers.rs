@@ -234,8 +234,8 @@ fn any_tiling_by_crops_is_the_whole_picture() {
     let camera = stage.scene.cameras[0].clone();
     let settings = RenderSettings { crop, ..settings };
     assert!(settings.check(&stage.scene, &set.emitters).is_err());
-    let delegate = RenderDelegate::new(&stage.scene, &set.emitters, &set.tree, camera, settings);
-    assert!(matches!(delegate.render(FRAME, &()), Err(RenderError::Plan(_))));
+    let delegate = RenderDelegate::new(&stage.scene, &set.emitters, camera, settings);
+    assert!(matches!(delegate.render(&set.tree, FRAME, &()), Err(RenderError::Plan(_))));
 }
 
 fn linear<T>(values: [T; 2]) -> Keys<T> {
@@ -379,9 +379,8 @@ fn samples_that_are_not_finite_are_left_out_counted_and_located() {
     let settings = RenderSettings { depth: 0, light_groups: Vec::new(), ..all_layers(16, 4) };
     let set = stage.set();
     let camera = stage.scene.cameras[0].clone();
-    let delegate =
-        RenderDelegate::new(&stage.scene, &set.emitters, &set.tree, camera, settings.clone());
-    let frame = delegate.render(1, &()).unwrap();
+    let delegate = RenderDelegate::new(&stage.scene, &set.emitters, camera, settings.clone());
+    let frame = delegate.render(&set.tree, 1, &()).unwrap();
     let FrameStats { non_finite, first_non_finite, .. } = frame.stats;
     let samples: Vec<f32> = frame.buffers.channel("sampleCount").unwrap().collect();
     let left_out = samples.iter().map(|count| 4.0 - count).sum::<f32>();
@@ -393,7 +392,7 @@ fn samples_that_are_not_finite_are_left_out_counted_and_located() {
     assert!(file.channels.iter().all(|(n, v)| is_depth(n) || v.iter().all(|v| v.is_finite())));
     assert!(file.channel("G").contains(&5.0), "what is finite stays");
     let alone = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
-    assert!(alone.install(|| delegate.render(1, &()).unwrap()) == frame);
+    assert!(alone.install(|| delegate.render(&set.tree, 1, &()).unwrap()) == frame);
 }
 
 /// Stops after some questions.
@@ -412,14 +411,17 @@ fn a_stopped_frame_is_no_frame() {
     let stage = floor([true; 3]);
     let set = stage.set();
     let camera = stage.scene.cameras[0].clone();
-    let settings = RenderSettings { width: 40, height: 8, ..direct(1, 1) };
-    let delegate = RenderDelegate::new(&stage.scene, &set.emitters, &set.tree, camera, settings);
-    // It is asked at the columns 0, 16 and 32 of each row.
+    let settings = RenderSettings { width: 40, height: 8, samples: 16, ..direct(1, 1) };
+    let delegate = RenderDelegate::new(&stage.scene, &set.emitters, camera, settings);
+    // It is asked at the samples 0, 256 and 512 of the 640 of each row.
     for questions in [0, 1, 13, 23] {
         let patience = Patience(AtomicU64::new(0), questions);
-        assert!(matches!(delegate.render(1, &patience), Err(RenderError::Stopped)), "{questions}");
+        assert!(
+            matches!(delegate.render(&set.tree, 1, &patience), Err(RenderError::Stopped)),
+            "{questions}"
+        );
     }
-    assert!(delegate.render(1, &Patience(AtomicU64::new(0), 24)).is_ok());
+    assert!(delegate.render(&set.tree, 1, &Patience(AtomicU64::new(0), 24)).is_ok());
 }
 
 #[test]

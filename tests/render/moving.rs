@@ -196,9 +196,9 @@ fn a_frame_that_the_tree_lacks_is_named() {
     let set = Set::of(&stage.scene, &FRAMES);
     let camera = stage.scene.cameras[0].clone();
     let settings = RenderSettings { samples: 1, ..settings(LightStrategy::Tree, 0) };
-    let delegate = RenderDelegate::new(set.scene, &set.emitters, &set.tree, camera, settings);
+    let delegate = RenderDelegate::new(set.scene, &set.emitters, camera, settings);
     for frame in [0, 2, 26, i32::MIN] {
-        match delegate.render(frame, &()) {
+        match delegate.render(&set.tree, frame, &()) {
             Err(RenderError::NoSuchFrame(error)) => {
                 assert_eq!((error.frame, error.first, error.last), (frame, 1, 25));
                 assert!(error.to_string().contains("--frames"), "{error}");
@@ -206,7 +206,7 @@ fn a_frame_that_the_tree_lacks_is_named() {
             other => panic!("frame {frame}: {:?}", other.err()),
         }
     }
-    assert!(delegate.render(13, &()).is_ok());
+    assert!(delegate.render(&set.tree, 13, &()).is_ok());
     // Where no light moves, every frame will do.
     let still = rooms::lambert_room();
     still.set().render(&self::settings(LightStrategy::Tree, 0), i32::MAX);
@@ -236,9 +236,8 @@ fn what_stands_still_and_what_moves_share_one_probability() {
     let set = Set::of(&stage.scene, &FRAMES);
     let count = set.emitters.len();
     let split = count - set.emitters.changing_count();
-    let table = set.tree.leaf_table();
     for frame in FRAMES {
-        let tree = set.tree.at_frame(frame, &table).unwrap();
+        let tree = set.tree.at_frame(frame).unwrap();
         let (mut of_still, mut of_moving) = (0, 0);
         for receiver in receivers() {
             let told: Vec<f64> =

@@ -39,8 +39,7 @@ fn nearest(place: Vec3) -> Vec3 {
 fn the_tree_finds_the_only_light_in_reach() {
     let stage = lattice();
     let set = stage.set();
-    let table = set.tree.leaf_table();
-    let tree = set.tree.at_frame(1, &table).unwrap();
+    let tree = set.tree.at_frame(1).unwrap();
     let place_of = |emitter: u32| {
         let EmitterPlace::Light(row) = set.emitters.place_of(emitter) else {
             panic!("{emitter} is no light")

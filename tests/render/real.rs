@@ -97,9 +97,9 @@ fn seventeen_million_emitters() {
     tell("built");
     tree.verify().unwrap();
     tell("verified");
-    let delegate = RenderDelegate::new(&scene, &emitters, &tree, camera, settings());
+    let delegate = RenderDelegate::new(&scene, &emitters, camera, settings());
     tell("geometry prepared");
-    let buffers = delegate.render(1, &()).unwrap().buffers;
+    let buffers = delegate.render(&tree, 1, &()).unwrap().buffers;
     assert!(buffers.beauty().all(|beauty| beauty.is_finite()));
     tell("rendered");
 }

@@ -205,8 +205,8 @@ impl<'a> Set<'a> {
 
     /// A frame, seen by a camera that stands at a node of the scene.
     pub fn seen_by(&self, camera: Camera, settings: &RenderSettings, frame: i32) -> RenderBuffers {
-        RenderDelegate::new(self.scene, &self.emitters, &self.tree, camera, settings.clone())
-            .render(frame, &())
+        RenderDelegate::new(self.scene, &self.emitters, camera, settings.clone())
+            .render(&self.tree, frame, &())
             .unwrap_or_else(|error| panic!("{error}"))
             .buffers
     }

@@ -258,8 +258,7 @@ fn splitting_everything_leaves_no_noise_of_picking() {
 fn no_point_samples_more_lights_than_it_may() {
     let stage = open_room();
     let set = stage.set();
-    let table = set.tree.leaf_table();
-    let tree = set.tree.at_frame(1, &table).unwrap();
+    let tree = set.tree.at_frame(1).unwrap();
     let mut scratch = Scratch::default();
     // A sun and a dome stand beside the tree, or nothing does.
     for (beside, of_beside) in [(&[][..], 0), (&[0.3, 0.1][..], 2)] {

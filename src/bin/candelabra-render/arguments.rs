@@ -1,6 +1,7 @@
 //! The command line.
 
-use candelabra::pipeline::{ASPECT, Strict, View, option};
+use crate::display::Form;
+use candelabra::pipeline::{Preview, RenderJob, Strict, View, option};
 use candelabra::render::frame_names::FrameNames;
 use candelabra::render::frames::Frames;
 use candelabra::render::{Aov, LightGroupRule, LightStrategy, RenderSettings, SplitBy, Window};
@@ -10,7 +11,8 @@ use std::path::PathBuf;
 
 /// Renders the frames of a shot through a light tree.
 ///
-/// Exit codes: 0 done, 1 a frame or everything failed, 2 usage, 3 the tree is stale or broken.
+/// Exit codes: 0 done, 1 a frame or everything failed, 2 usage, 3 the tree is stale or broken; 128 and a
+/// signal's number if that signal stopped it (130 Ctrl-C, 143 SIGTERM): finished frames are kept.
 #[derive(Parser)]
 #[command(version, arg_required_else_help = true)]
 pub struct Arguments {
@@ -66,7 +68,7 @@ pub struct Arguments {
     /// Write a PNG beside each picture
     #[arg(long)]
     pub png: bool,
-    /// Exposure of the PNG in stops; chosen from the first picture if not given
+    /// Exposure of the PNG in stops; if not given, one for the shot, chosen from the scene's first frame
     #[arg(long, allow_negative_numbers = true, requires = "png", value_parser = option::stops)]
     pub exposure: Option<f32>,
     /// Beauty in 32-bit floats instead of 16
@@ -94,6 +96,21 @@ pub struct Arguments {
     /// --strict=lights,cameras (lights, materials, geometry, cameras, animation, other)
     #[arg(long, value_name = "CATEGORIES", num_args = 0..=1, require_equals = true, default_missing_value = Strict::EVERYTHING)]
     pub strict: Option<Strict>,
+    /// How progress is shown
+    #[arg(long, value_enum, default_value_t, env = "CANDELABRA_PROGRESS")]
+    pub progress: Form,
+    /// Print at the end where time and memory went, as text or JSON
+    #[arg(long, value_enum, num_args = 0..=1, require_equals = true, default_missing_value = "text")]
+    pub stats: Option<StatsForm>,
+}
+
+/// How statistics are printed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum StatsForm {
+    /// Over several lines
+    Text,
+    /// A JSON object on one line
+    Json,
 }
 
 /// How lights are picked.
@@ -122,9 +139,6 @@ pub enum Test {
     SolidAngle,
 }
 
-/// Rows of a picture whose size is not given.
-const HEIGHT: u32 = 720;
-
 /// Pictures are OpenEXR files, and their previews are named after them.
 fn pictures(pattern: &str) -> Result<FrameNames, String> {
     if !pattern.to_ascii_lowercase().ends_with(".exr") {
@@ -134,9 +148,23 @@ fn pictures(pattern: &str) -> Result<FrameNames, String> {
 }
 
 impl Arguments {
-    /// Width over height of the pictures, of a camera that asks for none.
-    pub fn aspect(&self) -> f32 {
-        self.res.map_or(ASPECT, |(width, height)| width as f32 / height as f32)
+    /// The job that they ask for.
+    pub fn job(&self) -> RenderJob {
+        RenderJob {
+            scene: self.scene.clone(),
+            tree: self.tree.clone(),
+            frames: self.frames.clone(),
+            output: self.output.clone(),
+            view: self.view.clone(),
+            size: self.res,
+            settings: self.settings(),
+            fog: self.fog.clone(),
+            force_lights: self.force_light.clone(),
+            preview: self.png.then_some(Preview { exposure: self.exposure }),
+            resume: self.resume,
+            verify: !self.no_verify,
+            strict: self.strict.clone(),
+        }
     }
 
     /// The layers, in one order and each once: the same picture has the same settings.
@@ -149,13 +177,8 @@ impl Arguments {
         aovs
     }
 
-    /// The knobs, for a camera of some aspect.
-    pub fn settings(&self, aspect: Option<f32>) -> RenderSettings {
-        let (width, height) =
-            self.res.unwrap_or_else(|| option::size_of(aspect.unwrap_or(ASPECT), HEIGHT));
+    fn settings(&self) -> RenderSettings {
         RenderSettings {
-            width,
-            height,
             samples: self.spp,
             depth: self.depth,
             seed: self.seed,
@@ -173,7 +196,6 @@ impl Arguments {
                 Test::Variance => SplitBy::Variance,
                 Test::SolidAngle => SplitBy::SolidAngle,
             },
-            mis: true,
             aovs: self.aovs(),
             float_beauty: self.float,
             light_groups: self.light_group.clone(),
@@ -181,6 +203,7 @@ impl Arguments {
                 [x0, y0, x1, y1] => Some(Window { x0, y0, x1, y1 }),
                 _ => None,
             }),
+            ..RenderSettings::default()
         }
     }
 }

@@ -1,18 +1,17 @@
 //! `candelabra-render`: renders the frames of a shot through a light tree.
 
 mod arguments;
-mod progress;
-mod shot;
-#[path = "../candelabra/texture_bar.rs"]
-mod texture_bar;
+mod display;
+mod stop;
 
-use arguments::Arguments;
+use arguments::{Arguments, StatsForm};
 use candelabra::page::Plain;
-use candelabra::pipeline::{TreeError, ViewError};
-use candelabra::render::PlanError;
-use candelabra::render::frame_names::FrameNamesError;
+use candelabra::pipeline::{RenderError, RenderReport};
 use clap::Parser;
+use display::Display;
+use std::io::Write;
 use std::process::ExitCode;
+use stop::Stop;
 
 /// Some frames failed, or nothing could be rendered at all.
 const FAILED: u8 = 1;
@@ -20,37 +19,71 @@ const FAILED: u8 = 1;
 const USAGE: u8 = 2;
 /// The tree file is stale or broken.
 const BAD_TREE: u8 = 3;
+/// A signal stopped the job: this and the signal's number, as a shell has it.
+const STOPPED: u8 = 128;
 
 fn main() -> ExitCode {
     let arguments = Arguments::parse();
-    match shot::render(&arguments) {
-        Ok(0) => ExitCode::SUCCESS,
-        Ok(failed) => {
-            let plural = if failed == 1 { "" } else { "s" };
-            eprintln!("candelabra-render: {failed} frame{plural} failed; any others are done");
-            ExitCode::from(FAILED)
-        }
+    match run(&arguments) {
+        Ok(code) => code.into(),
         Err(error) => {
             eprintln!("candelabra-render: {}", Plain(format_args!("{error:#}")));
-            ExitCode::from(match error {
-                error if is_bad_tree(&error) => BAD_TREE,
-                error if is_usage(&error) => USAGE,
+            ExitCode::from(match error.downcast_ref::<RenderError>() {
+                Some(error) if error.is_bad_tree() => BAD_TREE,
+                Some(error) if error.is_usage() => USAGE,
                 _ => FAILED,
             })
         }
     }
 }
 
-/// Whether the options contradict each other although each is valid by itself.
-fn is_usage(error: &anyhow::Error) -> bool {
-    let is_crop = matches!(error.downcast_ref(), Some(PlanError::Crop(_)));
-    is_crop
-        || error.is::<FrameNamesError>()
-        || error.downcast_ref().is_some_and(ViewError::is_usage)
+fn run(arguments: &Arguments) -> anyhow::Result<u8> {
+    if let Some(threads) = arguments.threads {
+        rayon::ThreadPoolBuilder::new().num_threads(threads.into()).build_global()?;
+    }
+    let stop = Stop::listen()?;
+    let asked = stop.clone();
+    let display = Display::new(arguments.progress, move || asked.signal().is_some());
+    let report = arguments.job().run(&display)?;
+    drop(display);
+    if let Some(form) = arguments.stats {
+        tell_stats(&report, form)?;
+    }
+    Ok(code_of(&report, &stop))
 }
 
-/// Whether the tree file itself is at fault; not one that is absent.
-fn is_bad_tree(error: &anyhow::Error) -> bool {
-    use TreeError::{Broken, Contradicts, Stale};
-    matches!(error.downcast_ref(), Some(Broken { .. } | Stale { .. } | Contradicts { .. }))
+/// The exit code, and on standard error what it means.
+fn code_of(report: &RenderReport, stop: &Stop) -> u8 {
+    let frames = &report.frames;
+    if report.stopped {
+        let (done, asked) = (frames.done + frames.up_to_date, frames.asked);
+        eprintln!(
+            "candelabra-render: stopped; {done} of {asked} frames are done; go on with --resume"
+        );
+        return STOPPED + stop.signal().unwrap_or_default();
+    }
+    if frames.failed > 0 {
+        let plural = if frames.failed == 1 { "" } else { "s" };
+        eprintln!("candelabra-render: {} frame{plural} failed; any others are done", frames.failed);
+        return FAILED;
+    }
+    0
+}
+
+fn tell_stats(report: &RenderReport, form: StatsForm) -> anyhow::Result<()> {
+    let mut stats = serde_json::to_value(report)?;
+    stats["peak_memory_bytes"] = peak_memory_bytes().into();
+    let mut out = std::io::stdout().lock();
+    match form {
+        StatsForm::Json => writeln!(out, "{stats}")?,
+        StatsForm::Text => writeln!(out, "{stats:#}")?,
+    }
+    Ok(())
+}
+
+/// The most memory that this process has had, if the system tells.
+fn peak_memory_bytes() -> Option<u64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
+    Some(line.trim().strip_suffix("kB")?.trim().parse::<u64>().ok()? * 1024)
 }

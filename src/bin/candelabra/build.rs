@@ -77,7 +77,11 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     let named = || arguments.scene.display().to_string();
     pipeline::force_lights(&mut scene, &arguments.force_light).with_context(named)?;
     let real = |path: &Path| path.canonicalize().ok();
-    if scene.files.iter().any(|input| real(input).is_some() && real(input) == real(&output)) {
+    if scene
+        .files
+        .iter()
+        .any(|input| real(&input.path).is_some() && real(&input.path) == real(&output))
+    {
         bail!("{}: is the scene's own file; choose another output", output.display());
     }
     pipeline::check_output(&output)?;

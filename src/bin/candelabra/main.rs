@@ -2,10 +2,13 @@
 
 mod build;
 mod diff;
+mod farm;
 mod inspect;
 mod measure;
 mod page;
 mod race;
+mod run;
+mod run_display;
 mod shot;
 mod texture_bar;
 mod verify;
@@ -29,12 +32,16 @@ enum Command {
     Build(build::Arguments),
     /// Compare two versions of a scene, or their trees: which lights changed, and by how much
     Diff(diff::Arguments),
+    /// Write a job of a pipeline down for a farm: OpenJD, Slurm or OpenCue
+    Farm(farm::Arguments),
     /// Print what is in a scene or in a tree file, and what the scene requires
     Inspect(inspect::Arguments),
     /// Compute exactly how far off each strategy of picking lights is, at points of a picture
     Measure(measure::Arguments),
     /// Render with several settings and compare their errors and times
     Race(race::Arguments),
+    /// Carry out the jobs of a pipeline on this machine
+    Run(run::Arguments),
     /// Check that tree files keep every rule of the format, and name the first that is broken
     Verify(verify::Arguments),
 }
@@ -48,9 +55,11 @@ fn main() -> ExitCode {
     let outcome = match &command {
         Command::Build(arguments) => build::run(arguments).map(done),
         Command::Diff(arguments) => diff::run(arguments),
+        Command::Farm(arguments) => farm::run(arguments).map(done),
         Command::Inspect(arguments) => inspect::run(arguments).map(done),
         Command::Measure(arguments) => measure::run(arguments).map(done),
         Command::Race(arguments) => race::run(arguments).map(done),
+        Command::Run(arguments) => run::run(arguments),
         Command::Verify(arguments) => verify::run(arguments),
     };
     match outcome {
@@ -61,6 +70,7 @@ fn main() -> ExitCode {
             eprintln!("candelabra: {}", Plain(format_args!("{error:#}")));
             match command {
                 Command::Diff(_) => diff::TROUBLE.into(),
+                _ if run::is_usage(&error) => USAGE.into(),
                 _ if error.downcast_ref().is_some_and(ViewError::is_usage) => USAGE.into(),
                 _ => ExitCode::FAILURE,
             }

@@ -35,8 +35,7 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments) -> Result<()> {
     let shot = Shot::prepare(&arguments.shot, ASPECT)?;
     let settings = RenderSettings { width: 1024, height: 1024, ..Default::default() };
-    let delegate =
-        RenderDelegate::new(&shot.scene, &shot.emitters, &shot.tree, shot.camera.clone(), settings);
+    let delegate = RenderDelegate::new(&shot.scene, &shot.emitters, shot.camera.clone(), settings);
     let options = ProbeOptions {
         probes: arguments.probes,
         visibility: arguments.visibility,
@@ -44,7 +43,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
         max_lights: arguments.max_lights,
         seed: arguments.seed,
     };
-    let report = at_probes(&delegate, shot.frame, &options)?;
+    let report = at_probes(&delegate, &shot.tree, shot.frame, &options)?;
     let mut out = std::io::stdout().lock();
     if arguments.json {
         writeln!(out, "{}", serde_json::to_string_pretty(&report)?)?;

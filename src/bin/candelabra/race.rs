@@ -90,18 +90,13 @@ pub fn run(arguments: &Arguments) -> Result<()> {
             },
         })
         .collect();
-    let mut delegate = RenderDelegate::new(
-        &shot.scene,
-        &shot.emitters,
-        &shot.tree,
-        shot.camera.clone(),
-        base.clone(),
-    );
+    let mut delegate =
+        RenderDelegate::new(&shot.scene, &shot.emitters, shot.camera.clone(), base.clone());
     let style = ProgressStyle::with_template("{bar:30} {pos}/{len} pictures, {eta} left");
     let bar = ProgressBar::new(entrants.len() as u64 * u64::from(arguments.pictures));
     let bar = bar.with_style(style.expect("the template is sound"));
     let options = RaceOptions { frame: shot.frame, pictures: arguments.pictures };
-    let results = race(&mut delegate, &entrants, &options, || bar.inc(1))?;
+    let results = race(&mut delegate, &shot.tree, &entrants, &options, || bar.inc(1))?;
     bar.finish_and_clear();
     let mut out = std::io::stdout().lock();
     if arguments.json {

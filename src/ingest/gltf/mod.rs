@@ -66,7 +66,8 @@ struct Output {
 /// Reads a file. A file called `.glb` may not be anything else than glTF; a `.gltf` may be binary too.
 pub(super) fn load(path: &Path, must_be_glb: bool) -> Result<Scene, Fault> {
     let (mut notes, mut budget) = (Notes::default(), Budget::for_geometry());
-    let file = Container::parse(super::read_file(path)?, must_be_glb, &mut notes)?;
+    let (bytes, read) = super::read_file(path)?;
+    let file = Container::parse(bytes, must_be_glb, &mut notes)?;
     let folder = Folder::of(path)?;
     budget.grow(file.size() as u64);
     let document = Document::parse(file.json(), &mut budget, &mut notes)?;
@@ -86,7 +87,7 @@ pub(super) fn load(path: &Path, must_be_glb: bool) -> Result<Scene, Fault> {
     let mut output = Output { scene, notes, budget, picture_budget: Budget::for_pictures() };
     hierarchy::compile(&source, &mut output)?;
     output.scene.notes = output.notes.into_list();
-    output.scene.files = folder.into_files(path);
+    output.scene.files = folder.into_files(read);
     Ok(output.scene)
 }
 

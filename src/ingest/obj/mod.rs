@@ -43,7 +43,7 @@ const NO_UV: Vec2 = Vec2::new(0.0, 1.0);
 
 /// Reads a file.
 pub(super) fn load(path: &Path) -> Result<Scene, Fault> {
-    let bytes = super::read_file(path)?;
+    let (bytes, read) = super::read_file(path)?;
     let folder = Folder::of(path)?;
     let mut budget = Budget::for_geometry();
     budget.grow(bytes.len() as u64);
@@ -107,7 +107,7 @@ pub(super) fn load(path: &Path) -> Result<Scene, Fault> {
         return Err(Fault::new("file", "holds no faces").remedy("export the faces of the model"));
     }
     scene.notes = notes.into_list();
-    scene.files = folder.into_files(path);
+    scene.files = folder.into_files(read);
     Ok(scene)
 }
 

@@ -31,7 +31,7 @@ use reuse::{Found, Reuse};
 use saoh::Halves;
 
 /// Changes whenever the same bounds would give other bytes: part of every fingerprint.
-pub const ALGORITHM_VERSION: u32 = 4;
+pub const ALGORITHM_VERSION: u32 = 5;
 
 /// Below this depth clusters are cut by count: no input makes the recursion much deeper.
 const DEEPEST_BY_COST: usize = 100;

@@ -46,43 +46,52 @@ impl<D: AsRef<[u8]> + Sync> LightTree<D> {
         let lights = self.lights();
         let [from, to] = [classes.start, classes.end]
             .map(|class| lights.partition_point(|light| light.class < class));
-        &lights[from..to]
+        // Of lights that nobody has put in order there may be none.
+        lights.get(from..to).unwrap_or_default()
     }
 
     /// Checks the rows of the frames and their entries of forced lights; those of the file if there are
     /// no frames.
     pub(super) fn verify_frames(&self) -> Checked {
-        let kind_of = |row: u32| self.trees().get(row as usize).and_then(TreeKind::of);
-        let has_still = self.still_tree().is_some();
-        let any_changes = !self.lights_of(LightRow::CHANGES..LightRow::FORCED).is_empty();
         let mut before = None;
         let mut next_forced = 0_u64;
-        for (row, &FrameRow { frame, tree, first_forced, forced_count }) in
+        for (row, &FrameRow { frame, first_forced, forced_count, .. }) in
             self.frames().iter().enumerate()
         {
             check(before < Some(frame), rules::FRAMES_ASCEND, row)?;
             before = Some(frame);
-            // Where only forced lights change, frames share the tree of what stands still.
-            let is_right = match (any_changes, has_still) {
-                (true, _) => kind_of(tree) == Some(TreeKind::Frame),
-                (false, true) => kind_of(tree) == Some(TreeKind::Still),
-                (false, false) => tree == NO_TREE,
-            };
-            check(is_right, rules::FRAME_HAS_ITS_TREE, row)?;
+            self.verify_root(row)?;
             let follows = u64::from(first_forced) == next_forced;
             next_forced += u64::from(forced_count);
             let is_there = next_forced <= self.forced().len() as u64;
             check(follows && is_there, rules::FRAMES_USE_FORCED, row)?;
             self.verify_forced(first_forced as usize..next_forced as usize)?;
         }
+        let is_told =
+            self.fingerprints().is_empty() || self.fingerprints().len() == self.frames().len();
+        check_all(is_told, rules::FRAMES_HAVE_FINGERPRINTS)?;
         if self.frames().is_empty() {
             return self.verify_forced(0..self.forced().len());
         }
         check_all(next_forced == self.forced().len() as u64, rules::FRAMES_USE_FORCED)
     }
 
+    /// Checks the tree of a frame.
+    pub(super) fn verify_root(&self, row: usize) -> Checked {
+        let tree = self.frames()[row].tree;
+        let kind = self.trees().get(tree as usize).and_then(TreeKind::of);
+        let any_changes = !self.lights_of(LightRow::CHANGES..LightRow::FORCED).is_empty();
+        // Where only forced lights change, frames share the tree of what stands still.
+        let is_right = match (any_changes, self.still_tree().is_some()) {
+            (true, _) => kind == Some(TreeKind::Frame),
+            (false, true) => kind == Some(TreeKind::Still),
+            (false, false) => tree == NO_TREE,
+        };
+        check(is_right, rules::FRAME_HAS_ITS_TREE, row)
+    }
+
     /// Checks that a run of entries holds all forced lights, in order.
-    fn verify_forced(&self, run: Range<usize>) -> Checked {
+    pub(super) fn verify_forced(&self, run: Range<usize>) -> Checked {
         let mut lights = self.lights_of(LightRow::FORCED..2 * LightRow::FORCED).iter();
         for entry in run.clone() {
             let instance = self.instances().get(self.forced()[entry] as usize);

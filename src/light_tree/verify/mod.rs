@@ -2,6 +2,7 @@
 //! point dark. Each check is one of the format's [rules].
 
 mod contents;
+mod frame;
 mod groups;
 mod lights;
 pub(super) mod rules;
@@ -51,7 +52,7 @@ impl<D: AsRef<[u8]> + Sync> LightTree<D> {
         let (sums, rules) = rayon::join(|| self.verify_checksums(), || self.verify_rules());
         sums?;
         rules.map_err(StoreError::Broken)?;
-        self.note_walkable();
+        self.known().note_whole();
         Ok(())
     }
 
@@ -97,19 +98,21 @@ impl<D: AsRef<[u8]> + Sync> LightTree<D> {
 
     /// Checks the rows of the instances.
     fn verify_instances(&self) -> Checked {
-        for (row, instance) in self.instances().iter().enumerate() {
-            let kind = self.trees().get(instance.tree as usize).and_then(TreeKind::of);
-            let is_placeable = matches!(kind, Some(TreeKind::Shared | TreeKind::Still));
-            check(is_placeable, rules::INSTANCE_IS_OF_A_TREE, row)?;
-            check(instance.to_local.is_sound(), rules::INSTANCE_KEEPS_SHAPES, row)?;
-            let is_spare = instance.reserved == [0; 2] || self.is_of_later_version();
-            check(is_spare, rules::INSTANCE_SPARE_IS_ZERO, row)?;
-            let is_in_place =
-                instance.to_local == Similarity::IDENTITY && instance.first_emitter == 0;
-            let is_still = kind == Some(TreeKind::Still);
-            check(is_in_place || !is_still, rules::STILL_IS_IN_PLACE, row)?;
-        }
-        Ok(())
+        (0..self.instances().len()).try_for_each(|row| self.verify_instance(row))
+    }
+
+    /// Checks one of them.
+    fn verify_instance(&self, row: usize) -> Checked {
+        let instance = &self.instances()[row];
+        let kind = self.trees().get(instance.tree as usize).and_then(TreeKind::of);
+        let is_placeable = matches!(kind, Some(TreeKind::Shared | TreeKind::Still));
+        check(is_placeable, rules::INSTANCE_IS_OF_A_TREE, row)?;
+        check(instance.to_local.is_sound(), rules::INSTANCE_KEEPS_SHAPES, row)?;
+        let is_spare = instance.reserved == [0; 2] || self.is_of_later_version();
+        check(is_spare, rules::INSTANCE_SPARE_IS_ZERO, row)?;
+        let is_in_place = instance.to_local == Similarity::IDENTITY && instance.first_emitter == 0;
+        let is_still = kind == Some(TreeKind::Still);
+        check(is_in_place || !is_still, rules::STILL_IS_IN_PLACE, row)
     }
 }
 

@@ -5,13 +5,14 @@ use crate::light_tree::records;
 use crate::store::{RULES_OF_HEADER, RULES_OF_TABLE, Rule, rules};
 
 /// All rules that a tree file keeps, part by part.
-pub const RULES: [&[Rule]; 10] = [
+pub const RULES: [&[Rule]; 11] = [
     RULES_OF_HEADER,
     RULES_OF_TABLE,
     OF_TREES,
     OF_GROUPS,
     OF_INSTANCES,
     OF_FRAMES,
+    OF_FINGERPRINTS,
     OF_FORCED,
     OF_LIGHTS,
     OF_TEXTURES,
@@ -60,6 +61,11 @@ rules! {
     FRAMES_ASCEND = "frames ascend";
     FRAME_HAS_ITS_TREE = "its tree is of kind 2 if a light of class 2 or 3 is there, else of kind 1 or none";
     FRAMES_USE_FORCED = "its entries of FORC follow those of the frame before it; together they are all";
+}
+
+rules! {
+    records::FINGERPRINTS, OF_FINGERPRINTS:
+    FRAMES_HAVE_FINGERPRINTS = "each row of FRAM has one";
 }
 
 rules! {

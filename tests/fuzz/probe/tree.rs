@@ -56,10 +56,9 @@ pub fn probe(bytes: &[u8]) {
     for light in tree.lights() {
         let _ = tree.light_path(light);
     }
-    let table = tree.leaf_table();
     let known = tree.frames().iter().map(|row| row.frame).take(4);
     for number in known.chain([0, i32::MIN]) {
-        if let Ok(frame) = tree.at_frame(number, &table) {
+        if let Ok(frame) = tree.at_frame(number) {
             ask_all(&frame, is_sound);
         }
     }

@@ -1,0 +1,201 @@
+//! `candelabra run`: a pipeline, carried out on this machine.
+
+use crate::run_display::{Display, Progress};
+use anyhow::Result;
+use candelabra::farm::{
+    Job, JobError, OpenCueError, Outcome, Plan, PlanError, RunOptions, Selection, Summary, Task,
+    log_path, read_jobs, run as carry_out,
+};
+use candelabra::page::Plain;
+use candelabra::render::frames::Frames;
+use clap::Args;
+use std::io::{self, Write};
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+/// Carries out the jobs of a pipeline on this machine, layer by layer, chunk by chunk.
+///
+/// A job file is an OpenCue job (CJSL 1.15). Its commands run by `sh`, in the folder that holds `pipelines/` if the
+/// file is in a folder of that name, else in its own. What is up to date the commands find out themselves, so to
+/// go on after a failure or Ctrl-C is to run the same again. docs/farms.md tells all.
+///
+/// Exit codes: 0 all is done, 1 something failed, 2 usage or a job file that is refused, 128 + n ended by signal n.
+#[derive(Args)]
+pub struct Arguments {
+    /// A job file, or a folder of them
+    jobs: PathBuf,
+    #[command(flatten)]
+    wanted: Wanted,
+    /// Print the commands, in order, and run none
+    #[arg(long)]
+    dry_run: bool,
+    /// How often a task that fails is tried again; the job's <maxretries> if not given
+    #[arg(long, value_parser = clap::value_parser!(u32).range(..=1000))]
+    retries: Option<u32>,
+    /// The folder in which commands run
+    #[arg(long, value_name = "FOLDER")]
+    root: Option<PathBuf>,
+    /// The folder of the logs, seen from the folder in which commands run
+    #[arg(long, value_name = "FOLDER", default_value = LOGS)]
+    logs: PathBuf,
+    /// How progress is told
+    #[arg(long, value_enum, default_value_t = Progress::Auto)]
+    progress: Progress,
+}
+
+/// A part of a job.
+#[derive(Args)]
+#[group(skip)]
+pub struct Wanted {
+    /// This layer alone; may be given again. What it waits for is taken as done
+    #[arg(long, value_name = "NAME")]
+    pub layer: Vec<String>,
+    /// These frames alone, of layers of several frames: 1001-1048, 1001-1048x2, 1,5,9
+    #[arg(short, long, allow_hyphen_values = true)]
+    pub frames: Option<Frames>,
+}
+
+/// Where logs go if nobody says where.
+pub const LOGS: &str = "out/logs";
+const FAILED: u8 = 1;
+const USAGE: u8 = 2;
+/// Failures that a summary lists.
+const LISTED: usize = 20;
+
+impl Wanted {
+    pub fn selection(&self) -> Selection {
+        Selection { layers: self.layer.clone(), frames: self.frames.clone() }
+    }
+}
+
+/// Whether what is asked for cannot be carried out by anybody.
+pub fn is_usage(error: &anyhow::Error) -> bool {
+    let is_job = error.is::<JobError>() || error.is::<PlanError>();
+    is_job || matches!(error.downcast_ref(), Some(OpenCueError::NegativeFrame { .. }))
+}
+
+pub fn run(arguments: &Arguments) -> Result<ExitCode> {
+    let jobs = match read_jobs(&arguments.jobs) {
+        Ok(jobs) => jobs,
+        Err(refused) => {
+            for error in refused {
+                eprintln!("candelabra: {}", Plain(error));
+            }
+            return Ok(USAGE.into());
+        }
+    };
+    let selection = arguments.wanted.selection();
+    let plans: Vec<Plan> =
+        jobs.iter().map(|job| Plan::new(job, &selection)).collect::<Result<_, _>>()?;
+    if arguments.dry_run {
+        plans.iter().try_for_each(|plan| print_commands(plan, &options(arguments, plan.job)?))?;
+        return Ok(ExitCode::SUCCESS);
+    }
+    let mut display = Display::new(arguments.progress, &plans)?;
+    let (mut is_done, mut signal) = (true, None);
+    for plan in &plans {
+        let options = options(arguments, plan.job)?;
+        display.begin(plan);
+        let summary = carry_out(plan, &options, &mut display)?;
+        display.end(&summarise(arguments, plan, &options, &summary), summary.is_done());
+        is_done &= summary.is_done();
+        signal = summary.signal;
+        if signal.is_some() {
+            break;
+        }
+    }
+    Ok(match (signal, is_done) {
+        (Some(signal), _) => u8::try_from(128 + signal).unwrap_or(FAILED).into(),
+        (None, false) => FAILED.into(),
+        (None, true) => ExitCode::SUCCESS,
+    })
+}
+
+fn options(arguments: &Arguments, job: &Job) -> io::Result<RunOptions> {
+    // The commands are told of the logs and run elsewhere.
+    let root = std::path::absolute(arguments.root.as_ref().unwrap_or(&job.root))?;
+    let retries = arguments.retries.unwrap_or(job.retries);
+    Ok(RunOptions { logs: root.join(&arguments.logs), root, retries })
+}
+
+fn print_commands(plan: &Plan, options: &RunOptions) -> io::Result<()> {
+    let mut out = io::stdout().lock();
+    writeln!(out, "# {} in {}", plan.job.name, Plain(options.root.display()))?;
+    plan.tasks().try_for_each(|task| writeln!(out, "# {}\n{}", task.name, task.command))
+}
+
+/// What came of a job, what failed, and how to go on.
+fn summarise(
+    arguments: &Arguments,
+    plan: &Plan,
+    options: &RunOptions,
+    summary: &Summary,
+) -> String {
+    let count =
+        |is: fn(&Outcome) -> bool| summary.tasks.iter().filter(|(_, outcome)| is(outcome)).count();
+    let done = count(|outcome| matches!(outcome, Outcome::Done { .. }));
+    let kept = count(|outcome| matches!(outcome, Outcome::Done { up_to_date: true }));
+    let (name, all) = (&plan.job.name, summary.tasks.len());
+    let mut lines = vec![match kept {
+        0 => format!("{name}: {done} of {all} tasks done"),
+        _ => format!("{name}: {done} of {all} tasks done, {kept} of them up to date before"),
+    }];
+    let failed = summary.tasks.iter().filter_map(|(task, outcome)| match outcome {
+        Outcome::Failed(fault) => Some(format!(
+            "  {} failed: {fault}; log {}",
+            task.name,
+            log_path(options, plan, task).display()
+        )),
+        _ => None,
+    });
+    lines.extend(shortened(failed.collect()));
+    let waiting = summary.tasks.iter().filter_map(|(task, outcome)| match outcome {
+        Outcome::Blocked { by } => Some(format!("  {} not run: it waits for {by}", task.name)),
+        Outcome::Stopped => Some(format!("  {} not done: the run was stopped", task.name)),
+        _ => None,
+    });
+    lines.extend(shortened(waiting.collect()));
+    if !summary.is_done() {
+        lines.push(format!("go on with: {}", again(arguments, plan, summary)));
+    }
+    lines.join("\n")
+}
+
+fn shortened(mut lines: Vec<String>) -> Vec<String> {
+    if lines.len() > LISTED {
+        let more = lines.len() - LISTED;
+        lines.truncate(LISTED);
+        lines.push(format!("  ... and {more} more tasks"));
+    }
+    lines
+}
+
+/// The command that carries out what is left.
+fn again(arguments: &Arguments, plan: &Plan, summary: &Summary) -> String {
+    let word = |text: &str| {
+        shlex::try_quote(text).map_or_else(|_| text.to_owned(), |quoted| quoted.into_owned())
+    };
+    let mut words = vec!["candelabra run".into(), word(&plan.job.path.display().to_string())];
+    let mut option = |name: &str, value: &str| words.push(format!("{name} {}", word(value)));
+    let is_left = |place: usize| {
+        let is_missed = |(task, outcome): &&(Task, Outcome)| {
+            task.layer == place && !matches!(outcome, Outcome::Done { .. })
+        };
+        summary.tasks.iter().any(|entry| is_missed(&entry))
+    };
+    let left = (0..plan.layers.len()).filter(|&place| is_left(place));
+    left.for_each(|place| option("--layer", &plan.layers[place].layer.name));
+    if let Some(frames) = &arguments.wanted.frames {
+        option("--frames", &candelabra::farm::range::format(frames.as_slice()));
+    }
+    if let Some(retries) = arguments.retries {
+        option("--retries", &retries.to_string());
+    }
+    if let Some(root) = &arguments.root {
+        option("--root", &root.display().to_string());
+    }
+    if arguments.logs.as_os_str() != LOGS {
+        option("--logs", &arguments.logs.display().to_string());
+    }
+    words.join(" ")
+}

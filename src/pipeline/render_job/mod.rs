@@ -1,0 +1,169 @@
+//! Rendering a shot: read once, checked before the first frame, then frame after frame.
+//!
+//! ```text
+//! read the scene -> find the camera -> open and check the tree, or build it
+//!   for each frame:  there already, of the same?  can it be written?  render  -> hand over
+//!                                                            beside it: encode, write, rename
+//! ```
+//!
+//! What cannot work is found before the first frame is rendered. A frame that fails does not stop the
+//! others. The picture of a frame depends on the job and on that frame alone, not on which other frames this
+//! process renders, nor on how often it was stopped before.
+
+mod clock;
+mod error;
+mod exposure;
+mod outputs;
+mod pass;
+mod report;
+mod shot;
+mod writer;
+
+pub use error::RenderError;
+pub use report::{FrameCounts, RenderReport, SceneCounts, Seconds};
+
+use super::{
+    Event, OpenedTree, PreviewStamp, ShotTrees, Stamp, Strict, TreeError, TreeFile, View, Watch,
+    collect_emitters, open_tree,
+};
+use crate::emitter::Emitters;
+use crate::render::RenderSettings;
+use crate::render::frame_names::FrameNames;
+use crate::render::frames::Frames;
+use crate::scene::{Medium, Scene};
+use clock::Clock;
+use outputs::Outputs;
+use pass::Pass;
+use shot::Shot;
+use std::path::{Path, PathBuf};
+use writer::{Writer, Writing};
+
+/// A shot to be rendered.
+#[derive(Clone, Debug)]
+pub struct RenderJob {
+    /// The scene: `.gltf`, `.glb` or `.obj`.
+    pub scene: PathBuf,
+    /// Its light tree; without one, trees are built in memory.
+    pub tree: Option<PathBuf>,
+    /// Which frames; the first of the scene if not given.
+    pub frames: Option<Frames>,
+    /// The names of the pictures.
+    pub output: FrameNames,
+    /// What to look through.
+    pub view: View,
+    /// Columns and rows; if not given, [`HEIGHT`](Self::HEIGHT) rows in the camera's shape.
+    pub size: Option<(u32, u32)>,
+    /// The other knobs. Their size is not used.
+    pub settings: RenderSettings,
+    /// Fog in the place of the scene's own.
+    pub fog: Option<Medium>,
+    /// Paths of lights to be forced, beside those that the scene forces.
+    pub force_lights: Vec<String>,
+    /// Previews beside the pictures, if any.
+    pub preview: Option<Preview>,
+    /// Keep pictures that are there, whole, and of the same.
+    pub resume: bool,
+    /// Prove that the tree file is sound before it is used.
+    pub verify: bool,
+    /// Notes about the scene that are errors.
+    pub strict: Option<Strict>,
+}
+
+/// How a preview is exposed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Preview {
+    /// In stops; if not given, one for the whole shot is chosen from the scene's first frame.
+    pub exposure: Option<f32>,
+}
+
+impl RenderJob {
+    /// Rows of a picture whose size is not given.
+    pub const HEIGHT: u32 = 720;
+
+    /// Renders the frames. Those that fail are told, and counted in the report.
+    ///
+    /// # Errors
+    /// If nothing can be rendered at all.
+    pub fn run(&self, watch: &dyn Watch) -> Result<RenderReport, RenderError> {
+        let mut clock = Clock::start();
+        let outputs = Outputs::new(&self.output, self.preview.is_some());
+        if let Some(frames) = &self.frames {
+            outputs.check(frames, self.resume)?;
+        }
+        tell_stage(watch, "reading the scene");
+        let shot = Shot::read(self, watch)?;
+        if self.frames.is_none() {
+            outputs.check(&shot.frames, self.resume)?;
+        }
+        outputs.refuse_inputs(&shot.scene, self.tree.as_deref(), &shot.frames)?;
+        outputs.sweep(&shot.frames);
+        clock.lap(|seconds| &mut seconds.scene);
+
+        tell_stage(watch, "looking at the light tree");
+        let file = match &self.tree {
+            Some(path) => Some((open_tree(path, false)?, path.as_path())),
+            None => None,
+        };
+        let file = file.as_ref().map(|(tree, path)| (tree, *path));
+        let emitters = self.emitters(&shot.scene, file.map(|(tree, _)| tree), watch);
+        let trees = (self.trees(&shot.scene, &emitters, file)?, file);
+        clock.lap(|seconds| &mut seconds.trees);
+
+        let writing = Writing { job: self, outputs: &outputs, watch };
+        let (frames, written) = std::thread::scope(|scope| {
+            let writer = Writer::start(scope, writing);
+            let pass = Pass::new(self, &shot, &emitters, trees, &outputs, watch, &mut clock);
+            let frames = pass.and_then(|mut pass| pass.render_all(&writer));
+            (frames, writer.finish())
+        });
+        clock.lap(|seconds| &mut seconds.waiting);
+        let mut frames = frames?;
+        frames.done += written.frames.done;
+        frames.failed += written.frames.failed;
+        let left = frames.asked - frames.done - frames.up_to_date - frames.failed;
+        Ok(RenderReport {
+            frames,
+            seconds: Seconds { writing: written.seconds, ..clock.finish() },
+            rays: written.trace.rays,
+            light_picks: written.trace.light_picks,
+            non_finite_samples: written.non_finite,
+            scene: SceneCounts {
+                lights: emitters.lights().len(),
+                emitters: emitters.len(),
+                triangles: shot.triangles(),
+                tree_file_bytes: file.map(|(tree, _)| tree.byte_length()),
+            },
+            stopped: left > 0,
+        })
+    }
+
+    /// What shines in the scene.
+    fn emitters(&self, scene: &Scene, tree: Option<&OpenedTree>, watch: &dyn Watch) -> Emitters {
+        let progress = |done: u64, all: u64| {
+            let percent = 100 * done / all.max(1);
+            tell_stage(watch, &format!("integrating textures, {percent} %"));
+        };
+        collect_emitters(scene, tree, &progress)
+    }
+
+    /// The trees: from the file, or built.
+    fn trees<'a>(
+        &'a self,
+        scene: &'a Scene,
+        emitters: &'a Emitters,
+        file: Option<(&'a OpenedTree, &'a Path)>,
+    ) -> Result<ShotTrees<'a>, TreeError> {
+        let Some((tree, path)) = file else { return ShotTrees::built(scene, emitters) };
+        let (tree, forced) = (tree.by_reference(), self.force_lights.as_slice());
+        ShotTrees::of_file(scene, emitters, TreeFile { tree, path, forced, verify: self.verify })
+    }
+
+    /// The stamp of the preview of a picture.
+    fn preview_stamp(&self, picture: &Stamp) -> PreviewStamp {
+        PreviewStamp::new(picture, self.preview.and_then(|preview| preview.exposure))
+    }
+}
+
+fn tell_stage(watch: &dyn Watch, name: &str) {
+    watch.tell(Event::Stage { name: name.into() });
+}

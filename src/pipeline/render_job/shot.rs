@@ -1,0 +1,70 @@
+//! What is read once for a shot.
+
+use super::{RenderError, RenderJob};
+use crate::pipeline::{ASPECT, Event, Watch, force_lights, frames_of, load_scene, look, option};
+use crate::render::RenderSettings;
+use crate::render::frames::Frames;
+use crate::scene::{Camera, Scene};
+
+/// A scene with its camera, and what is to be rendered of it.
+pub(super) struct Shot {
+    pub scene: Scene,
+    pub camera: Camera,
+    pub frames: Frames,
+    pub settings: RenderSettings,
+}
+
+impl Shot {
+    pub fn read(job: &RenderJob, watch: &dyn Watch) -> Result<Shot, RenderError> {
+        let note = |text: String| watch.tell(Event::Note { text });
+        let mut scene = load_scene(&job.scene)?;
+        scene.notes.iter().for_each(|found| note(found.to_string()));
+        if let Some(strict) = &job.strict {
+            strict.check(&scene)?;
+        }
+        force_lights(&mut scene, &job.force_lights)
+            .map_err(|cause| RenderError::Force { scene: job.scene.clone(), cause })?;
+        if let Some(fog) = &job.fog {
+            scene.medium = Some(fog.clone());
+        }
+        let frames = frames_for(job.frames.as_ref(), &scene, &note);
+        let aspect = job.size.map_or(ASPECT, |(width, height)| width as f32 / height as f32);
+        let found = look(&mut scene, &job.view, aspect)?;
+        found.note.into_iter().for_each(note);
+        let camera = found.camera;
+        let shape = || option::size_of(camera.aspect.unwrap_or(ASPECT), RenderJob::HEIGHT);
+        let (width, height) = job.size.unwrap_or_else(shape);
+        let settings = RenderSettings { width, height, ..job.settings.clone() };
+        Ok(Shot { scene, camera, frames, settings })
+    }
+
+    /// Triangles of all instances.
+    pub fn triangles(&self) -> u64 {
+        let meshes = self.scene.instances.iter().map(|instance| instance.mesh as usize);
+        meshes.map(|mesh| self.scene.meshes[mesh].triangles.len() as u64).sum()
+    }
+}
+
+/// The frames that were asked for, or the first. Tells what may not be what the user means.
+fn frames_for(asked: Option<&Frames>, scene: &Scene, note: &dyn Fn(String)) -> Frames {
+    let own = frames_of(scene);
+    let (first, last) = (own[0], own[own.len() - 1]);
+    let source = scene.source.display();
+    let Some(asked) = asked else {
+        if own.len() > 1 {
+            note(format!(
+                "{source}: no frames were asked for; of its frames {first}-{last} the first is \
+                 rendered (see --frames)"
+            ));
+        }
+        return Frames::one(first);
+    };
+    let outside = asked.as_slice().iter().filter(|frame| !(first..=last).contains(frame)).count();
+    if own.len() > 1 && outside > 0 {
+        note(format!(
+            "{source}: {outside} of the frames to be rendered are outside its own, {first}-{last}; \
+             there, what moves stands as it does at the nearer end"
+        ));
+    }
+    asked.clone()
+}

@@ -1,0 +1,140 @@
+//! Writing a frame while the next one is rendered.
+
+use super::RenderJob;
+use super::outputs::Outputs;
+use super::report::FrameCounts;
+use crate::pipeline::{Event, PreviewStamp, Stamp, Watch};
+use crate::render::RenderedFrame;
+use crate::render::beauty::Beauty;
+use crate::render::exr::write_exr;
+use crate::render::path::TraceStats;
+use crate::render::png::write_png;
+use std::io;
+use std::path::Path;
+use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+use std::thread::{Scope, ScopedJoinHandle};
+use std::time::Instant;
+
+/// A frame that has been rendered.
+pub(super) struct Finished {
+    pub rendered: RenderedFrame,
+    pub stamp: Stamp,
+    /// How long it took.
+    pub seconds: f64,
+    /// Stops of its preview, if it has one.
+    pub exposure: Option<f32>,
+}
+
+/// How pictures are written.
+pub(super) struct Writing<'a> {
+    pub job: &'a RenderJob,
+    pub outputs: &'a Outputs<'a>,
+    pub watch: &'a dyn Watch,
+}
+
+/// What a writer did.
+#[derive(Default)]
+pub(super) struct Written {
+    pub frames: FrameCounts,
+    pub seconds: f64,
+    pub trace: TraceStats,
+    pub non_finite: u64,
+}
+
+/// A thread that writes what it is handed. It takes one frame at a time, so that there are never more than
+/// two in memory.
+pub(super) struct Writer<'scope> {
+    sender: SyncSender<Finished>,
+    thread: ScopedJoinHandle<'scope, Written>,
+}
+
+impl<'scope> Writer<'scope> {
+    pub fn start<'a: 'scope>(
+        scope: &'scope Scope<'scope, '_>,
+        writing: Writing<'a>,
+    ) -> Writer<'scope> {
+        let (sender, receiver) = sync_channel(0);
+        Writer { sender, thread: scope.spawn(move || writing.write_all(&receiver)) }
+    }
+
+    /// Hands over a frame. Waits until the one before is written.
+    pub fn hand_over(&self, frame: Finished) {
+        // Only a panic ends the thread early; it comes to light when the thread is joined.
+        let _ = self.sender.send(frame);
+    }
+
+    /// Waits until everything is written.
+    pub fn finish(self) -> Written {
+        drop(self.sender);
+        match self.thread.join() {
+            Ok(written) => written,
+            Err(panic) => std::panic::resume_unwind(panic),
+        }
+    }
+}
+
+impl Writing<'_> {
+    fn write_all(&self, receiver: &Receiver<Finished>) -> Written {
+        let mut written = Written::default();
+        for frame in receiver {
+            let started = Instant::now();
+            let stats = frame.rendered.stats;
+            written.trace = written.trace.plus(stats.trace);
+            written.non_finite += stats.non_finite;
+            match self.write(&frame) {
+                Ok(()) => written.frames.done += 1,
+                Err(error) => {
+                    written.frames.failed += 1;
+                    let why = format!("it was rendered, but cannot be written: {error}");
+                    self.watch.tell(Event::FrameFailed { frame: frame.stamp.frame, why });
+                }
+            }
+            written.seconds += started.elapsed().as_secs_f64();
+        }
+        written
+    }
+
+    fn write(&self, frame: &Finished) -> io::Result<()> {
+        let Finished { rendered, stamp, seconds, exposure } = frame;
+        if let Some((x, y)) = rendered.stats.first_non_finite {
+            let text = format!(
+                "frame {}: {} samples were infinite or no number and were left out, the first in pixel \
+                 {x},{y}",
+                stamp.frame, rendered.stats.non_finite
+            );
+            self.watch.tell(Event::Note { text });
+        }
+        let output = self.outputs.picture(stamp.frame);
+        let metadata = serde_json::to_string(stamp)?;
+        match write_exr(&output, &rendered.buffers, &metadata) {
+            Ok(bytes) => self.outputs.note_length(bytes),
+            Err(error) => {
+                // As long as it could be: the next frame is not rendered for nothing.
+                self.outputs.note_length(rendered.buffers.byte_length());
+                return Err(error);
+            }
+        }
+        if let (Some(stops), Some(preview)) = (exposure, self.outputs.preview(stamp.frame)) {
+            let beauty = Beauty::of(&rendered.buffers, self.job.settings.float_beauty);
+            write_preview(&preview, &beauty, *stops, &self.job.preview_stamp(stamp))?;
+        }
+        self.watch.tell(Event::FrameDone {
+            frame: stamp.frame,
+            seconds: *seconds,
+            rays: rendered.stats.trace.rays,
+            light_picks: rendered.stats.trace.light_picks,
+            output,
+        });
+        Ok(())
+    }
+}
+
+/// Writes a preview with its stamp.
+pub(super) fn write_preview(
+    path: &Path,
+    picture: &Beauty,
+    stops: f32,
+    stamp: &PreviewStamp,
+) -> io::Result<()> {
+    write_png(path, picture, stops, &serde_json::to_string(stamp)?)
+}

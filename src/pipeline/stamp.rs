@@ -1,0 +1,138 @@
+//! Stamps: what a picture was rendered from, kept in its metadata.
+//!
+//! A stamp speaks of what was used, not of what is on the disk by now: the scene's files are hashed as they
+//! are read, the tree as it is sampled, the program as it runs. So a picture of an old scene never gets the
+//! stamp of a new one, however the files change while it is rendered.
+
+use super::content::scene_fingerprint;
+use crate::light_tree::ALGORITHM_VERSION;
+use crate::render::RenderSettings;
+use crate::render::exr::read_metadata;
+use crate::render::png::read_text;
+use crate::scene::{Camera, Node, Scene};
+use serde::{Deserialize, Serialize};
+use serde_json::json;
+use std::fmt;
+use std::fs::File;
+use std::io;
+use std::path::Path;
+
+const SOFTWARE: &str = concat!("candelabra-render ", env!("CARGO_PKG_VERSION"));
+
+/// What one picture was rendered from.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Stamp {
+    /// Program and version, for people.
+    pub software: String,
+    /// The frame.
+    pub frame: i32,
+    /// BLAKE3 over all that the pixels depend on, but for the tree: the bytes of the scene's files, the
+    /// program, settings, camera and frame.
+    pub fingerprint: String,
+    /// BLAKE3 over what the frame can sample of the light tree.
+    pub tree: String,
+    /// The settings, for people.
+    pub settings: serde_json::Value,
+    /// The camera, for people.
+    pub camera: serde_json::Value,
+}
+
+impl Stamp {
+    /// The stamp of a picture, if every byte of its file is as it was written.
+    pub fn of_picture(path: &Path) -> Option<Stamp> {
+        serde_json::from_str(&read_metadata(path)?).ok()
+    }
+}
+
+/// What a preview was made of.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PreviewStamp {
+    /// Of the picture.
+    pub fingerprint: String,
+    /// Of the picture.
+    pub tree: String,
+    /// Stops, as they were asked for; `None` if they were left to the program.
+    pub exposure: Option<f32>,
+}
+
+impl PreviewStamp {
+    /// The stamp of the preview of a picture.
+    pub fn new(picture: &Stamp, exposure: Option<f32>) -> PreviewStamp {
+        let Stamp { fingerprint, tree, .. } = picture.clone();
+        PreviewStamp { fingerprint, tree, exposure }
+    }
+
+    /// The stamp of a preview, if its file is whole.
+    pub fn of_preview(path: &Path) -> Option<PreviewStamp> {
+        serde_json::from_str(&read_text(path)?).ok()
+    }
+}
+
+/// Makes the stamps of a shot.
+pub struct Stamper {
+    common: blake3::Hasher,
+    settings: serde_json::Value,
+    camera: serde_json::Value,
+}
+
+impl Stamper {
+    /// For a scene as it was read, seen through a camera. `rest` is whatever else the pixels depend on.
+    ///
+    /// # Errors
+    /// If this program cannot be read.
+    pub fn new(
+        scene: &Scene,
+        camera: &Camera,
+        settings: &RenderSettings,
+        rest: impl fmt::Debug,
+    ) -> io::Result<Stamper> {
+        let settings = serde_json::to_value(settings).map_err(io::Error::other)?;
+        let place = place_of(scene, camera);
+        let mut common = blake3::Hasher::new();
+        common.update(&scene_fingerprint(scene));
+        common.update(&program_fingerprint()?);
+        let text =
+            format!("{SOFTWARE} {ALGORITHM_VERSION} {camera:?} {place:?} {rest:?} {settings}");
+        common.update(text.as_bytes());
+        let camera = json!({ "path": place[0].path, "exposure_scale": camera.exposure_scale });
+        Ok(Stamper { common, settings, camera })
+    }
+
+    /// The fingerprint of a frame, without its tree.
+    pub fn fingerprint(&self, frame: i32) -> String {
+        let mut hasher = self.common.clone();
+        hasher.update(&frame.to_le_bytes());
+        hasher.finalize().to_hex().to_string()
+    }
+
+    /// The stamp of a frame, with the digest of what it samples of the tree.
+    pub fn stamp(&self, frame: i32, tree: [u8; 32]) -> Stamp {
+        Stamp {
+            software: SOFTWARE.into(),
+            frame,
+            fingerprint: self.fingerprint(frame),
+            tree: blake3::Hash::from(tree).to_hex().to_string(),
+            settings: self.settings.clone(),
+            camera: self.camera.clone(),
+        }
+    }
+}
+
+/// The camera's node, and all above it.
+fn place_of<'a>(scene: &'a Scene, camera: &Camera) -> Vec<&'a Node> {
+    let node = |number: u32| &scene.nodes[number as usize];
+    let above = |node_: &&'a Node| node_.parent.map(node);
+    std::iter::successors(Some(node(camera.node)), above).collect()
+}
+
+/// This very program, by its content: another build may make other pictures.
+fn program_fingerprint() -> io::Result<[u8; 32]> {
+    // The link leads to the file that runs, even if another has taken its name since.
+    let program = match File::open("/proc/self/exe") {
+        Ok(file) => file,
+        Err(_) => File::open(std::env::current_exe()?)?,
+    };
+    let mut hasher = blake3::Hasher::new();
+    hasher.update_reader(program)?;
+    Ok(*hasher.finalize().as_bytes())
+}
