@@ -12,12 +12,13 @@ use crate::math::{Frame, warp};
 use crate::scene::Texture;
 use glam::{Affine3A, DVec2, Vec2, Vec3};
 use std::f32::consts::PI;
+use std::sync::Arc;
 
 /// Light from infinity in every direction.
 pub struct Dome<'a> {
     map: DirectionMap,
     radiance_nits: Rgb,
-    picture: Option<(&'a Texture, PictureDistribution)>,
+    picture: Option<(&'a Texture, Arc<PictureDistribution>)>,
     mean_luminance: f32,
 }
 
@@ -33,13 +34,22 @@ pub struct DomeSample {
 }
 
 impl<'a> Dome<'a> {
-    /// A dome at a node with some local-to-world transform.
-    pub fn new(to_world: &Affine3A, radiance_nits: Rgb, texture: Option<&'a Texture>) -> Dome<'a> {
+    /// A dome at a node with some local-to-world transform, and the [distribution](Self::distribution) of its
+    /// picture there.
+    pub fn new(
+        to_world: &Affine3A,
+        radiance_nits: Rgb,
+        picture: Option<(&'a Texture, Arc<PictureDistribution>)>,
+    ) -> Dome<'a> {
         let map = DirectionMap::of(to_world);
-        let picture = texture.map(|texture| (texture, PictureDistribution::new(texture, &map)));
         let mean = picture.as_ref().map_or(Rgb::ONE, |(_, distribution)| distribution.mean);
         let mean_luminance = luminance(radiance_nits * mean);
         Dome { map, radiance_nits, picture, mean_luminance }
+    }
+
+    /// By how bright a picture is where, at such a node. It is work for a large picture.
+    pub fn distribution(to_world: &Affine3A, texture: &Texture) -> PictureDistribution {
+        PictureDistribution::new(texture, &DirectionMap::of(to_world))
     }
 
     /// Radiance from a direction (unit, world space), nits.
@@ -103,6 +113,11 @@ mod tests {
     use proptest::prelude::*;
     use std::f64::consts::TAU;
 
+    fn pictured<'a>(place: &Affine3A, sky: &'a Texture) -> Dome<'a> {
+        let distribution = Dome::distribution(place, sky);
+        Dome::new(place, Rgb::ONE, Some((sky, Arc::new(distribution))))
+    }
+
     fn picture(width: u32, height: u32, texel: impl Fn(u32, u32) -> f32) -> Texture {
         let texel = |i: u32| [texel(i % width, i / width); 3];
         Texture {
@@ -148,7 +163,7 @@ mod tests {
         for matrix in
             [a, a * 1e-12, scale(1.0, 4.0, 1.0) * a, mirrored_and_sheared, a * scale(1.0, 0.0, 2.0)]
         {
-            let dome = Dome::new(&transform(matrix), Rgb::ONE, Some(&sky));
+            let dome = pictured(&transform(matrix), &sky);
             let by_brightness = mean(&dome, |s| f64::from(s.radiance.x));
             let n = 1024;
             let cell = |i: usize| (i as f32 + 0.5) / n as f32;
@@ -186,7 +201,7 @@ mod tests {
             let sky = picture(8, height, |_, y| f32::from(u8::from(is_lit(y))));
             let sky = Texture { bilinear, ..sky };
             let turn = DMat3::from_euler(glam::EulerRot::XYZ, a, 0.7, b);
-            let dome = Dome::new(&transform(turn), Rgb::ONE, Some(&sky));
+            let dome = pictured(&transform(turn), &sky);
             let flux = mean(&dome, |sample| f64::from(sample.radiance.x));
             // A bilinear lookup ramps down over a row about the edge: integrate by latitude.
             let n = 200_000;
@@ -214,7 +229,7 @@ mod tests {
     fn a_dim_sky_beside_a_blinding_sun_is_all_found() {
         // One texel of 1e9 nits in a sky of 1: 24 bits cannot tell the others from none.
         let sky = picture(4096, 16, |x, y| if (x, y) == (100, 5) { 1e9 } else { 1.0 });
-        let dome = Dome::new(&Affine3A::IDENTITY, Rgb::ONE, Some(&sky));
+        let dome = pictured(&Affine3A::IDENTITY, &sky);
         let dark = (0..4096 * 16)
             .map(|i| DVec2::new(f64::from(i % 4096) + 0.5, f64::from(i / 4096) + 0.5))
             .map(|texel| uv_to_direction(texel / DVec2::new(4096.0, 16.0)).as_vec3())
@@ -232,7 +247,7 @@ mod tests {
             DMat3::from_diagonal(DVec3::new(1.0, 4.0, 1.0)) * DMat3::from_rotation_x(-0.8),
             DMat3::from_cols(DVec3::X, DVec3::new(0.7, 1.0, 0.0), DVec3::Z * -2.0),
         ] {
-            let dome = Dome::new(&transform(matrix), Rgb::ONE, Some(&sky));
+            let dome = pictured(&transform(matrix), &sky);
             // The middle of the picture is local +Z, from where light travels along -Z.
             let sun = -crate::math::directions::aim(&transform(matrix)).as_vec3();
             assert!(dome.radiance(sun).x > 0.9);
@@ -253,7 +268,7 @@ mod tests {
     #[test]
     fn a_black_picture_is_even_and_its_density_a_number() {
         let black = picture(32, 16, |_, _| 0.0);
-        let dome = Dome::new(&Affine3A::IDENTITY, Rgb::ONE, Some(&black));
+        let dome = pictured(&Affine3A::IDENTITY, &black);
         assert!(dome.sample(Vec3::Z, Vec2::splat(0.3)).unwrap().pdf.is_finite());
         assert_eq!(dome.illuminance_estimate(), 0.0);
     }

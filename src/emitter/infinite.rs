@@ -4,12 +4,15 @@
 //! cameras have it.
 
 use super::dome::{Dome, DomeSample};
+use super::picture::PictureDistribution;
 use crate::math::color::{Rgb, luminance};
 use crate::math::directions::aim;
 use crate::math::{Frame, warp};
-use crate::scene::{LightKind, Pose, Scene, Visibility};
-use glam::{Vec2, Vec3};
+use crate::scene::{LightKind, Pose, Scene, Texture, Visibility};
+use glam::{Affine3A, Vec2, Vec3};
+use std::collections::BTreeMap;
 use std::f32::consts::PI;
+use std::sync::{Arc, Mutex, PoisonError};
 
 /// An infinite light, in world space.
 pub struct InfiniteLight<'a> {
@@ -49,30 +52,71 @@ pub struct InfiniteSample {
 
 /// The infinite lights of a scene that shine in a pose.
 pub fn infinite_lights<'a>(scene: &'a Scene, pose: &Pose) -> Vec<InfiniteLight<'a>> {
-    let kind = |light: &crate::scene::Light, rgb: Rgb| match light.kind {
-        LightKind::Distant { angle_rad, .. } if rgb.max_element() > 0.0 => {
-            let half_angle_rad = 0.5 * angle_rad.clamp(0.0, 2.0 * PI);
-            let sine = (0.5 * half_angle_rad).sin();
-            Some(Kind::Sun(Sun {
-                towards: -aim(&pose.world(light.node)).as_vec3(),
-                irradiance_lux: rgb,
-                half_angle_rad,
-                one_minus_cos: 2.0 * sine * sine,
-            }))
+    Skies::default().lights(scene, pose)
+}
+
+/// The infinite lights of a scene, pose after pose. What a dome's picture is sampled by is worked out again
+/// only if the dome has moved.
+#[derive(Default)]
+pub struct Skies {
+    /// Of each dome with a picture: where it stood, and the distribution of its picture there.
+    known: Mutex<BTreeMap<usize, (Affine3A, Arc<PictureDistribution>)>>,
+}
+
+impl Skies {
+    /// Those that shine in a pose. The scene must always be the same.
+    pub fn lights<'a>(&self, scene: &'a Scene, pose: &Pose) -> Vec<InfiniteLight<'a>> {
+        let lights = scene.lights.iter().enumerate();
+        let found = lights.filter_map(|(light, row)| {
+            let rgb = scene.rgb_of_light(light as u32, pose);
+            let kind = self.kind(scene, pose, light, rgb)?;
+            let (forced, visibility) = (row.forced, row.visibility);
+            Some(InfiniteLight { light, forced, visibility, kind })
+        });
+        found.collect()
+    }
+
+    fn kind<'a>(&self, scene: &'a Scene, pose: &Pose, row: usize, rgb: Rgb) -> Option<Kind<'a>> {
+        let light = &scene.lights[row];
+        match light.kind {
+            LightKind::Distant { angle_rad, .. } if rgb.max_element() > 0.0 => {
+                let half_angle_rad = 0.5 * angle_rad.clamp(0.0, 2.0 * PI);
+                let sine = (0.5 * half_angle_rad).sin();
+                Some(Kind::Sun(Sun {
+                    towards: -aim(&pose.world(light.node)).as_vec3(),
+                    irradiance_lux: rgb,
+                    half_angle_rad,
+                    one_minus_cos: 2.0 * sine * sine,
+                }))
+            }
+            LightKind::Dome { texture, .. } if rgb.max_element() > 0.0 => {
+                let place = pose.world(light.node);
+                let picture = texture.map(|index| {
+                    let texture = &scene.textures[index as usize];
+                    (texture, self.distribution(row, place, texture))
+                });
+                Some(Kind::Dome(Box::new(Dome::new(&place, rgb, picture))))
+            }
+            _ => None,
         }
-        LightKind::Dome { texture, .. } if rgb.max_element() > 0.0 => {
-            let texture = texture.map(|index| &scene.textures[index as usize]);
-            Some(Kind::Dome(Box::new(Dome::new(&pose.world(light.node), rgb, texture))))
+    }
+
+    fn distribution(
+        &self,
+        row: usize,
+        place: Affine3A,
+        texture: &Texture,
+    ) -> Arc<PictureDistribution> {
+        let mut known = self.known.lock().unwrap_or_else(PoisonError::into_inner);
+        match known.get(&row) {
+            Some((then, distribution)) if *then == place => distribution.clone(),
+            _ => {
+                let distribution = Arc::new(Dome::distribution(&place, texture));
+                known.insert(row, (place, distribution.clone()));
+                distribution
+            }
         }
-        _ => None,
-    };
-    let lights = scene.lights.iter().enumerate();
-    let found = lights.filter_map(|(light, row)| {
-        let rgb = scene.rgb_of_light(light as u32, pose);
-        let (forced, visibility) = (row.forced, row.visibility);
-        Some(InfiniteLight { light, forced, visibility, kind: kind(row, rgb)? })
-    });
-    found.collect()
+    }
 }
 
 impl InfiniteLight<'_> {
@@ -163,5 +207,65 @@ impl Sun {
     /// where cosines are 1.
     fn contains(&self, direction: Vec3) -> bool {
         !self.is_delta() && (direction - self.towards).length_squared() <= 2.0 * self.one_minus_cos
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::{Channel, Interpolation, Keys, Light, Node, Pixels, Trs, Wrap};
+    use glam::Quat;
+
+    /// A sky that turns, in the first two seconds alone, under a picture with one bright corner.
+    fn turning_sky() -> Scene {
+        let turned = [0.0, 1.0, 2.0, 2.0].map(Quat::from_rotation_y).to_vec();
+        let keys = Keys {
+            times_s: vec![0.0, 1.0, 2.0, 3.0],
+            values: turned,
+            interpolation: Interpolation::Linear,
+        };
+        let mut node = Node::fixed("/sky", None, Trs::default());
+        node.channels = vec![Channel::Rotation(keys)];
+        let mut texels = vec![[0.1; 3]; 16 * 8];
+        texels[3 * 16 + 2] = [50.0; 3];
+        Scene {
+            nodes: vec![node],
+            textures: vec![Texture {
+                width: 16,
+                height: 8,
+                name: "sky".into(),
+                pixels: Pixels::Float(texels),
+                wrap: [Wrap::Repeat, Wrap::Clamp],
+                bilinear: true,
+            }],
+            lights: vec![Light {
+                node: 0,
+                kind: LightKind::Dome { radiance_nits: Rgb::ONE, texture: Some(0) },
+                values: None,
+                range_m: None,
+                forced: false,
+                visibility: Visibility::default(),
+            }],
+            ..Default::default()
+        }
+    }
+
+    /// What was kept from other poses, there and back, is what a pose alone gives.
+    #[test]
+    fn a_sky_that_turned_is_the_sky_as_it_stands() {
+        let scene = turning_sky();
+        let skies = Skies::default();
+        for time_s in [0.0, 1.0, 1.0, 2.0, 3.0, 0.0] {
+            let pose = scene.pose_at(time_s);
+            let (kept, alone) = (skies.lights(&scene, &pose), infinite_lights(&scene, &pose));
+            for i in 0..64 {
+                let u = Vec2::new((i % 8) as f32 + 0.5, (i / 8) as f32 + 0.5) / 8.0;
+                let [kept, alone] = [&kept, &alone].map(|lights| lights[0].sample(Vec3::ZERO, u));
+                let parts = |sample: Option<InfiniteSample>| {
+                    sample.map(|s| (s.direction, s.radiance, s.pdf))
+                };
+                assert_eq!(parts(kept), parts(alone), "{time_s} {u}");
+            }
+        }
     }
 }

@@ -29,7 +29,7 @@ mod textured;
 mod triangle;
 
 pub use bounding::LightOverflow;
-pub use infinite::{InfiniteLight, InfiniteSample, infinite_lights};
+pub use infinite::{InfiniteLight, InfiniteSample, Skies, infinite_lights};
 pub use mesh_light::MeshLight;
 pub use posed::{EmitterHit, LightSample, MeshPlace, PosedEmitters};
 pub use set::{EmitterPlace, EmitterRef, Emitters, LightEntry, LightSource};

@@ -1,12 +1,21 @@
 //! Floor 5: jobs, the only place where ingest meets the tree.
 //!
-//! [`load_scene`] reads a scene; [`collect_emitters`] finds what shines in it; [`survey()`] finds out
-//! what its tree depends on; [`build_tree`] builds the trees of a shot; [`check_fresh`] tells whether
-//! a tree still belongs to a scene, and if not, which lights changed. [`look()`] finds
-//! the camera that a user means, and makes one where there is none.
+//! A job is what one run of a program does: [`BuildJob`] and [`RenderJob`]. It tells [`Event`]s to a
+//! [`Watch`], prints nothing, and reads the clock only to report where time went. Jobs are made of stages:
+//!
+//! | stage | question |
+//! |---|---|
+//! | [`load_scene`], [`force_lights`], [`Strict`] | what is in the file, and is it good enough? |
+//! | [`look()`] | which camera does the user mean? |
+//! | [`collect_emitters`], [`survey()`] | what shines, and what do its trees depend on? |
+//! | [`build_tree`], [`rebuild_tree`] | the trees of a shot, anew or upon an earlier file |
+//! | [`ShotTrees`] | the trees of one frame after the other: from a file, or built |
+//! | [`check_fresh`], [`standing`] | does a whole file still belong to the scene; if not, which lights changed? |
+//! | [`Stamp`] | what was a picture rendered from? |
 
 mod agreement;
 mod build;
+mod build_job;
 mod content;
 mod fingerprint;
 mod fit;
@@ -28,6 +37,7 @@ mod watch;
 
 pub use agreement::{Contradiction, Standing, standing};
 pub use build::{Rebuilt, build_tree, origin_of, rebuild_tree};
+pub use build_job::{BreakEven, BuildError, BuildJob, BuildReport, Built, TakenOver};
 pub use content::scene_fingerprint;
 pub use forced::{NoLightThere, force_lights};
 pub use frames::frames_of;
@@ -39,7 +49,7 @@ pub use render_job::{
     FrameCounts, Preview, RenderError, RenderJob, RenderReport, SceneCounts, Seconds,
 };
 pub use rig::carry_camera;
-pub use shot_trees::{ShotTrees, TreeFile};
+pub use shot_trees::{ShotTrees, TreeChoice, TreeFile, with_trees};
 pub use stamp::{PreviewStamp, Stamp, Stamper};
 pub use strict::{Strict, StrictError};
 pub use survey::{Group, PlacedLight, SharedBounds, Survey, SurveyedFrame, survey};

@@ -8,14 +8,15 @@
 use super::agreement::Agreement;
 use super::build::build_frame;
 use super::fingerprint;
-use super::fresh::{TreeError, contradicts, stale};
+use super::fresh::{TreeError, contradicts, open_tree, stale};
 use super::survey::{SurveyedFrame, class_of};
 use super::surveyor::Surveyor;
+use super::textures::collect_emitters;
 use crate::emitter::{Emitters, LightEntry};
 use crate::light_tree::{LightLook, LightSummary, LightTree};
 use crate::scene::Scene;
-use crate::store::AlignedBytes;
-use std::path::Path;
+use crate::store::{AlignedBytes, MappedFile};
+use std::path::{Path, PathBuf};
 
 /// The light trees of a shot, frame after frame.
 pub struct ShotTrees<'a> {
@@ -48,6 +49,8 @@ pub struct TreeFile<'a> {
     pub forced: &'a [String],
     /// Whether to prove what a frame samples, and to compare its leaves with the scene's lights.
     pub verify: bool,
+    /// The file itself, if the tree is mapped: it tells whether somebody writes to it.
+    pub mapped: Option<&'a MappedFile>,
 }
 
 impl<'a> ShotTrees<'a> {
@@ -113,6 +116,29 @@ impl<'a> ShotTrees<'a> {
         }
     }
 
+    /// Makes sure that what was checked is what was sampled.
+    ///
+    /// # Errors
+    /// [`TreeError::Overwritten`] if somebody has written to the file since it was opened.
+    pub fn check_unwritten(&self) -> Result<(), TreeError> {
+        match &self.source {
+            Source::File { file: TreeFile { path, mapped: Some(mapped), .. }, .. }
+                if !mapped.is_unchanged() =>
+            {
+                Err(TreeError::Overwritten { path: (*path).into() })
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Length of the file in bytes, if there is one.
+    pub fn file_length(&self) -> Option<usize> {
+        match &self.source {
+            Source::File { file, .. } => Some(file.tree.byte_length()),
+            Source::Built { .. } => None,
+        }
+    }
+
     /// Refuses a file that is not one of this scene, whatever the frame.
     fn check_whole(&self) -> Result<(), TreeError> {
         let Source::File { file, .. } = &self.source else { return Ok(()) };
@@ -133,7 +159,7 @@ impl<'a> ShotTrees<'a> {
     fn check(&mut self, number: i32) -> Result<(), TreeError> {
         let changing = self.surveyor.is_changing();
         let Source::File { file, is_still_checked } = &self.source else { return Ok(()) };
-        let TreeFile { tree, path, forced, verify } = file;
+        let TreeFile { tree, path, forced, verify, .. } = file;
         let broken = |cause| TreeError::Broken { path: (*path).into(), cause };
         let mut frame = None;
         if changing {
@@ -208,4 +234,45 @@ impl<'a> ShotTrees<'a> {
         self.surveyor.forget_still();
         Ok(())
     }
+}
+
+/// Where the trees of a shot are to come from.
+#[derive(Clone, Debug, Default)]
+pub struct TreeChoice {
+    /// A tree file; if there is none, trees are built.
+    pub file: Option<PathBuf>,
+    /// What the user forces in addition to what the scene forces.
+    pub forced: Vec<String>,
+    /// Whether to prove what a frame samples of the file, and to compare its leaves with the scene's lights.
+    pub verify: bool,
+}
+
+/// Calls `work` with the emitters of a scene and the trees over them: what a process does with lights before
+/// its first frame. `watch` is told how many textured triangles are integrated, of how many.
+///
+/// # Errors
+/// If the file cannot be opened, or is not one of this scene; whatever `work` says.
+pub fn with_trees<T, E: From<TreeError>>(
+    scene: &Scene,
+    choice: &TreeChoice,
+    watch: &(dyn Fn(u64, u64) + Sync),
+    work: impl FnOnce(&Emitters, ShotTrees) -> Result<T, E>,
+) -> Result<T, E> {
+    let opened = choice.file.as_deref().map(|path| Ok((open_tree(path, false)?, path)));
+    let opened = opened.transpose().map_err(E::from)?;
+    let emitters = collect_emitters(scene, opened.as_ref().map(|(tree, _)| tree), watch);
+    let trees = match &opened {
+        None => ShotTrees::built(scene, &emitters)?,
+        Some((tree, path)) => {
+            let file = TreeFile {
+                tree: tree.by_reference(),
+                path,
+                forced: &choice.forced,
+                verify: choice.verify,
+                mapped: Some(tree.data()),
+            };
+            ShotTrees::of_file(scene, &emitters, file)?
+        }
+    };
+    work(&emitters, trees)
 }

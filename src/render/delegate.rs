@@ -13,7 +13,7 @@ use super::plan::{Plan, PlanError};
 use super::rays::RayScene;
 use super::settings::RenderSettings;
 use super::surface::Surfaces;
-use crate::emitter::{Emitters, PosedEmitters, infinite_lights};
+use crate::emitter::{Emitters, PosedEmitters, Skies};
 use crate::light_tree::{LightTree, NoSuchFrame};
 use crate::math::random::hash;
 use crate::scene::{Camera, Scene};
@@ -28,6 +28,7 @@ pub struct RenderDelegate<'a> {
     scene: &'a Scene,
     emitters: &'a Emitters,
     geometry: RayScene,
+    skies: Skies,
     settings: RenderSettings,
     plan: Result<Plan, PlanError>,
     camera: Camera,
@@ -106,6 +107,7 @@ impl<'a> RenderDelegate<'a> {
             scene,
             emitters,
             geometry: RayScene::new(scene, &scene.pose_at(0.0)),
+            skies: Skies::default(),
             plan: Plan::new(scene, emitters, &settings),
             settings,
             camera,
@@ -133,7 +135,7 @@ impl<'a> RenderDelegate<'a> {
         work: impl FnOnce(&Integrator) -> T,
     ) -> Result<T, NoSuchFrame> {
         let pose = self.scene.pose_at(self.scene.timeline.seconds_at(f64::from(frame)));
-        let infinite = infinite_lights(self.scene, &pose);
+        let infinite = self.skies.lights(self.scene, &pose);
         assert_eq!(tree.emitter_count(), self.emitters.len(), "the tree belongs to another scene");
         let tree = tree.at_frame(frame)?;
         let (width, height) = (self.settings.width, self.settings.height);

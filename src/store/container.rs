@@ -11,7 +11,7 @@ use std::ops::Range;
 /// text mode would change (PNG's manner).
 pub const MAGIC: [u8; 8] = *b"\x89LTR\r\n\x1a\n";
 /// Readers refuse another major version and read every minor one.
-pub const VERSION: (u16, u16) = (1, 1);
+pub const VERSION: (u16, u16) = (1, 2);
 const BYTE_ORDER_MARK: u32 = 0x0102_0304;
 /// The most sections that a file may have.
 const MOST_SECTIONS: u32 = 256;

@@ -162,6 +162,34 @@ fn a_picture_has_the_stamp_of_what_was_read() {
     shot.render(arguments).ends(0).says("up to date");
 }
 
+/// `cp` over a tree in use: the wrong way to publish. No frame gets a stamp of what was not sampled.
+#[test]
+fn a_tree_that_is_written_to_while_it_is_in_use_is_told() {
+    let shot = Shot::moving();
+    shot.candelabra(&format!("build {SCENE}")).ends(0);
+    let whole = shot.read("shot.ltree");
+    let begin = || {
+        let arguments = "--tree shot.ltree --frames 1-4 -o a.#.exr --spp 4000";
+        Running::start(&shot, arguments).until("preparing")
+    };
+    // Of the same bytes, and shorter: with pages that nobody can read any more.
+    for length in [whole.len(), 64] {
+        let running = begin();
+        let file = std::fs::File::create(shot.path("shot.ltree")).unwrap();
+        std::io::Write::write_all(&mut &file, &whole[..length]).unwrap();
+        let told = running.end();
+        assert_eq!(told.code, Some(3), "{told:?}");
+        told.complains(&["in use", "rename it over the old one", "--resume"]);
+        assert!(shot.names().iter().all(|name| !name.ends_with(".exr")), "{:?}", shot.names());
+        shot.write("shot.ltree", &whole);
+    }
+    // The right way: those who have the old one keep it.
+    let running = begin();
+    shot.write("other.ltree", &whole[..64]);
+    std::fs::rename(shot.path("other.ltree"), shot.path("shot.ltree")).unwrap();
+    assert_eq!(running.end().code, Some(0));
+}
+
 #[test]
 fn files_are_as_open_as_the_mask_says() {
     use std::os::unix::fs::PermissionsExt;
@@ -220,6 +248,9 @@ fn farms_hear_what_they_understand() {
     let done: Vec<f64> = events.iter().filter_map(|event| event["done"].as_f64()).collect();
     assert!(done.is_sorted() && done.last() == Some(&1.0), "{done:?}");
     assert!(lines("none").is_empty());
+    let built = || shot.candelabra("build shot.gltf --progress json").ends(0).out;
+    assert!(built().contains(r#"{"event":"stage","name":"building the trees"}"#));
+    assert!(built().contains(r#"{"event":"up-to-date","frame":null,"output":"shot.ltree"}"#));
 }
 
 #[test]

@@ -38,6 +38,9 @@ struct ReportedNode {
 #[derive(Debug, Serialize, Deserialize)]
 struct ReportedFrame {
     frame: Option<i32>,
+    /// Of what changes in it, if the file tells.
+    #[serde(default)]
+    fingerprint: Option<String>,
     emitters: Vec<u32>,
     energies: Vec<f64>,
     /// First emitters of the forced lights.
@@ -80,13 +83,15 @@ pub fn report<D: AsRef<[u8]>>(tree: &LightTree<D>) -> Report {
         let rows = match number {
             None => tree.forced(),
             Some(number) => {
-                let row = tree.frames().iter().find(|row| row.frame == number).unwrap();
+                let row = &tree.frames()[tree.row_of(number).unwrap()];
                 &tree.forced()[row.first_forced as usize..][..row.forced_count as usize]
             }
         };
         let first = |&row: &u32| tree.instances()[row as usize].first_emitter;
+        let row = number.and_then(|number| tree.row_of(number));
         ReportedFrame {
             frame: number,
+            fingerprint: row.and_then(|row| tree.fingerprints().get(row)).copied().map(hex),
             emitters,
             energies,
             forced: rows.iter().map(first).collect(),
@@ -168,6 +173,7 @@ fn a_reader_from_the_page_reads_what_the_library_reads() {
         "../fuzz/corpus/tree/forced.ltree",
         "golden.ltree",
         "textured.ltree",
+        "frames.ltree",
     ];
     for name in trees {
         let tree = pipeline::open_tree(&path(name), true).unwrap();

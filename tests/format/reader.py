@@ -14,7 +14,7 @@ import zlib
 
 MAGIC = b"\x89LTR\r\n\x1a\n"
 KNOWN = {"META": 1, "TREE": 48, "GRUP": 256, "INST": 64, "FRAM": 16, "FORC": 4, "LGHT": 64, "PATH": 1}
-KNOWN |= {"TXTR": 40, "MEAN": 16}
+KNOWN |= {"FPRT": 32, "TXTR": 40, "MEAN": 16}
 ALWAYS = ("TREE", "GRUP", "LGHT", "PATH")
 NO_TREE = 0xFFFFFFFF
 STILL = 1
@@ -147,6 +147,7 @@ class File:
         self.groups = [read_group(r) for r in rows("GRUP", 256)]
         self.instances = [struct.unpack("<12f4I", r) for r in rows("INST", 64)]
         self.frames = [struct.unpack("<iIII", r) for r in rows("FRAM", 16)] if s.get("FRAM") else None
+        self.fingerprints = rows("FPRT", 32)
         self.forced = [entry for (entry,) in struct.iter_unpack("<I", s.get("FORC", b""))]
         self.textures = [(r[:32], *struct.unpack("<2I", r[32:])) for r in rows("TXTR", 40)]
         self.means = [struct.unpack("<I3f", r) for r in rows("MEAN", 16)]
@@ -199,8 +200,9 @@ class File:
             require(all(math.isfinite(part) and part >= 0 for part in mean) and any(mean), "MEAN 1")
 
     def check(self):
-        """The textures; every tree, and that it holds just its lights."""
+        """The textures; the frames' fingerprints; every tree, and that it holds just its lights."""
         self.check_textures()
+        require(len(self.fingerprints) in (0, len(self.frames or [])), "FPRT 1")
         groups = 0
         for row, (first, count, _leaves, kind, _root) in enumerate(self.trees):
             require(first == groups, "TREE 3")
@@ -257,9 +259,11 @@ class File:
         frames = []
         for number, tree, forced in self.frames_sampled():
             emitters = [] if tree is None else self.emitters_at(tree)
+            told = dict(zip([row[0] for row in self.frames or []], self.fingerprints)).get(number)
             frames.append(
                 {
                     "frame": number,
+                    "fingerprint": told and told.hex(),
                     "emitters": [emitter for emitter, _ in emitters],
                     "energies": [energy for _, energy in emitters],
                     "forced": forced,

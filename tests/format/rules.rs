@@ -102,6 +102,8 @@ fn every_rule_is_asked_and_named_with_its_record() {
     groups(&mut cases);
     rows_of_the_rest(&mut cases);
     textures(&mut cases);
+    let whole = std::fs::read(crate::golden::path("frames.ltree")).unwrap();
+    cases.breaks_of(&whole, "FPRT 1", Record::All, |p| p.section("FPRT").truncate(32));
     // Files so large are not made for a test.
     let excused = ["GRUP 1"];
     for rule in RULES[2..].concat() {

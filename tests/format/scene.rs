@@ -4,13 +4,15 @@ use crate::bytes::Parts;
 use crate::golden::path;
 use crate::probe::repaired;
 use candelabra::emitter::Emitters;
-use candelabra::light_tree::{LightTree, Link, Node};
+use candelabra::light_tree::{LightTree, Link, Node, Receiver};
 use candelabra::pipeline::{
-    self, OpenedTree, Standing, TreeError, check_fresh, collect_emitters, rebuild_tree, standing,
+    self, OpenedTree, ShotTrees, Standing, TreeError, TreeFile, check_fresh, collect_emitters,
+    rebuild_tree, standing,
 };
 use candelabra::render::{LightStrategy, RenderDelegate, RenderSettings};
 use candelabra::scene::Scene;
 use candelabra::store::AlignedBytes;
+use glam::Vec3;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 const GROUP: usize = 256;
@@ -173,6 +175,56 @@ fn every_strategy_survives_what_nobody_verified() {
     }
 }
 
+/// The same of who asks for one frame: what is let pass has the scene's leaves in that frame.
+#[test]
+fn whatever_passes_in_a_frame_has_the_scenes_leaves_there() {
+    let frame_leaves = |tree: &LightTree<&[u8]>, frame| {
+        let (mut emitters, mut forced) = (Vec::new(), Vec::new());
+        let sampled = tree.at_frame(frame).unwrap();
+        let everywhere = Receiver { point: Vec3::splat(40.0), normal: Vec3::ZERO };
+        sampled.for_each_leaf(&everywhere, |emitter, importance, energy| {
+            emitters.push((emitter, importance.to_bits(), energy.to_bits()));
+        });
+        emitters.sort_unstable();
+        for light in 0..sampled.forced_count() {
+            let pick = sampled.sample_forced(light, &everywhere, 0.5);
+            forced.push(pick.map(|pick| (pick.light, pick.probability.to_bits())));
+        }
+        (emitters, forced)
+    };
+    for (number, owner) in both().into_iter().enumerate() {
+        let whole = owner.bytes.as_ref();
+        let (mut state, mut passed, mut refused) = (40 + number as u64, 0, 0);
+        let honest = open(owner.bytes.clone());
+        let frames = [1, 2, 3];
+        let honest = frames.map(|frame| frame_leaves(&honest.by_reference(), frame));
+        for round in 0..3000 {
+            let frame = frames[round % 3];
+            let tree = open(damaged(whole, &mut state));
+            // The means of textures are taken from the file, like all else.
+            let emitters = collect_emitters(&owner.scene, Some(&tree), &|_, _| {});
+            let path = "shot.ltree".as_ref();
+            let file = TreeFile {
+                tree: tree.by_reference(),
+                path,
+                forced: &[],
+                verify: true,
+                mapped: None,
+            };
+            let trees = ShotTrees::of_file(&owner.scene, &emitters, file);
+            match trees.and_then(|mut trees| Ok(frame_leaves(&trees.for_frame(frame)?, frame))) {
+                Err(_) => refused += 1,
+                Ok(found) => {
+                    passed += 1;
+                    assert_eq!(found.0.len(), honest[round % 3].0.len());
+                    assert!(found == honest[round % 3], "frame {frame}, round {round}");
+                }
+            }
+        }
+        assert!(passed > 100 && refused > 500, "{passed} {refused}");
+    }
+}
+
 /// The means of textures in a file are those that integrating gives, and are used.
 #[test]
 fn means_are_taken_from_the_file() {
@@ -271,6 +323,27 @@ fn the_golden_file_with_textures_is_read() {
         assert_eq!(found.len(), row.count as usize);
     }
     assert_eq!(tree.means_of(&[7; 32]), None);
+}
+
+/// The golden file of version 1.2, likewise: three frames of the golden scene, and two long after.
+#[test]
+fn the_golden_file_with_fingerprints_of_frames_is_read() {
+    let tree: OpenedTree = pipeline::open_tree(&path("frames.ltree"), true).unwrap();
+    let (rows, prints) = (tree.frames(), tree.fingerprints());
+    assert_eq!(rows.iter().map(|row| row.frame).collect::<Vec<_>>(), LONG);
+    assert_eq!(prints.len(), rows.len());
+    assert_eq!((prints[3], rows[3].tree), (prints[4], rows[4].tree));
+    assert!(prints[0] != prints[1] && rows[0].tree != rows[1].tree);
+}
+
+const LONG: [i32; 5] = [1, 2, 3, 1000, 1001];
+
+#[test]
+#[ignore = "writes the golden file with fingerprints of frames, once"]
+fn write_frames() {
+    let Owner { scene, emitters, .. } = Owner::of("golden.gltf");
+    let survey = pipeline::survey(&scene, &emitters, &LONG).unwrap();
+    std::fs::write(path("frames.ltree"), pipeline::build_tree(&survey)).unwrap();
 }
 
 #[test]

@@ -81,17 +81,6 @@ impl City {
     /// The file, written in the order that the [format](candelabra::store) asks for. Frame 1 exists
     /// if anything changes; else any frame does.
     pub fn tree(&self) -> Tree {
-        let (tree, _) = self.write(None);
-        tree
-    }
-
-    /// The same with a second frame, in which what changes shines by other factors, one a leaf; and
-    /// the energies of its leaves.
-    pub fn tree_with_second_frame(&self, factors: &[f32]) -> (Tree, Vec<(Link, f32)>) {
-        self.write(Some(factors))
-    }
-
-    fn write(&self, factors: Option<&[f32]>) -> (Tree, Vec<(Link, f32)>) {
         let mut writer = LightTreeWriter::default();
         for bounds in &self.shared {
             writer.add_tree(TreeKind::Shared, bounds, |i| Link::Emitter(i as u32));
@@ -99,7 +88,7 @@ impl City {
         let mut lights = Vec::new();
         let (links, bounds) = self.leaves(&self.still, 0, &mut writer, &mut lights);
         let still = writer.add_tree(TreeKind::Still, &bounds, |i| links[i]);
-        let (mut links, mut bounds, mut second) = (Vec::new(), Vec::new(), Vec::new());
+        let (mut links, mut bounds) = (Vec::new(), Vec::new());
         let changes = !self.changing.flat.is_empty() || !self.changing.placed.is_empty();
         if changes {
             if let Some(still) = still {
@@ -115,21 +104,11 @@ impl City {
         let forced = self.instances(&self.forced, 5, &mut writer, &mut lights);
         if changes {
             let tree = writer.add_tree(TreeKind::Frame, &bounds, |i| links[i]);
-            writer.add_frame(1, tree, &forced);
-            if let Some(factors) = factors {
-                let energies = bounds.iter().zip(factors.iter().cycle());
-                let energies = energies.map(|(bounds, factor)| bounds.energy * factor);
-                second = links.iter().copied().zip(energies).collect();
-                let of = |link| second.iter().find(|(leaf, _)| *leaf == link).unwrap().1;
-                let tree = writer.add_tree_with_energies(of);
-                writer.add_frame(2, Some(tree), &forced);
-            }
+            writer.add_frame(1, [1; 32], tree, &forced);
         } else {
             writer.add_forced(&forced);
         }
-        let tree = LightTree::open(writer.finish(&LightList::new(&lights), "{}", [3; 32]))
-            .expect("it opens");
-        (tree, second)
+        LightTree::open(writer.finish(&LightList::new(&lights), "{}", [3; 32])).expect("it opens")
     }
 
     fn leaves(

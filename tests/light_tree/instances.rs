@@ -7,7 +7,7 @@ use crate::support::{
 };
 use candelabra::bounds::{Aabb, Cone, LightBounds};
 use candelabra::light_tree::{
-    DistanceOnly, FrameTree, Link, Picked, Receiver, Scratch, Splitting, TreeKind,
+    DistanceOnly, FrameTree, Picked, Receiver, Scratch, Splitting, TreeKind,
 };
 use candelabra::math::random::hash;
 use glam::{Affine3A, Vec3};
@@ -116,9 +116,11 @@ proptest! {
     }
 
     #[test]
-    fn trees_below_trees_verify(city in city(), factors in prop::collection::vec(0.01f32..100.0, 5)) {
-        prop_assert_eq!(city.tree().verify(), Ok(()));
-        prop_assert_eq!(city.tree_with_second_frame(&factors).0.verify(), Ok(()));
+    fn trees_below_trees_verify(city in city()) {
+        let tree = city.tree();
+        // What one frame samples is proved by itself, too.
+        prop_assert_eq!(tree.verify_frame(1), Ok(()));
+        prop_assert_eq!(tree.verify(), Ok(()));
     }
 
     #[test]
@@ -241,33 +243,6 @@ proptest! {
             prop_assert_eq!(first as usize, tree.emitter_count());
             Ok(())
         })?;
-    }
-
-    /// A frame that differs in brightness alone has the clusters of the frame before, and its own
-    /// energies, summed up to the root.
-    #[test]
-    fn new_energies_leave_the_boxes_alone(
-        city in city(), factors in prop::collection::vec(0.01f32..100.0, 1..9)
-    ) {
-        let (tree, energies) = city.tree_with_second_frame(&factors);
-        let [.., first, second] = tree.trees() else { return Ok(()) };
-        if tree.frames().len() < 2 {
-            return Ok(());
-        }
-        let of = |link| energies.iter().find(|(leaf, _)| *leaf == link).map(|(_, energy)| *energy);
-        for (a, b) in tree.groups_of(first).iter().zip(tree.groups_of(second)) {
-            for (a, b) in a.nodes().zip(b.nodes()) {
-                let (a, b) = ((a.bounds(), a.link()), (b.bounds(), b.link()));
-                prop_assert_eq!(LightBounds { energy: b.0.energy, ..a.0 }, b.0);
-                prop_assert_eq!(a.1, b.1);
-                if !matches!(b.1, Link::Inner(_)) {
-                    prop_assert_eq!(Some(b.0.energy), of(b.1));
-                }
-            }
-        }
-        let sum: f64 = energies.iter().map(|(_, energy)| f64::from(*energy)).sum();
-        let told = f64::from(second.root.energy());
-        prop_assert!((told - sum).abs() <= 1e-6 * sum, "{told} {sum}");
     }
 
     #[test]

@@ -4,6 +4,7 @@ mod build;
 mod city;
 mod darkness;
 mod extremes;
+mod frames;
 mod glossy;
 mod importance;
 mod incremental;

@@ -1,6 +1,6 @@
 //! The command line.
 
-use crate::display::Form;
+use crate::display::Progress;
 use candelabra::pipeline::{Preview, RenderJob, Strict, View, option};
 use candelabra::render::frame_names::FrameNames;
 use candelabra::render::frames::Frames;
@@ -96,9 +96,8 @@ pub struct Arguments {
     /// --strict=lights,cameras (lights, materials, geometry, cameras, animation, other)
     #[arg(long, value_name = "CATEGORIES", num_args = 0..=1, require_equals = true, default_missing_value = Strict::EVERYTHING)]
     pub strict: Option<Strict>,
-    /// How progress is shown
-    #[arg(long, value_enum, default_value_t, env = "CANDELABRA_PROGRESS")]
-    pub progress: Form,
+    #[command(flatten)]
+    pub progress: Progress,
     /// Print at the end where time and memory went, as text or JSON
     #[arg(long, value_enum, num_args = 0..=1, require_equals = true, default_missing_value = "text")]
     pub stats: Option<StatsForm>,

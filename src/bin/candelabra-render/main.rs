@@ -1,7 +1,11 @@
 //! `candelabra-render`: renders the frames of a shot through a light tree.
 
 mod arguments;
+#[path = "../candelabra/display.rs"]
 mod display;
+#[path = "../candelabra/lost_pages.rs"]
+mod lost_pages;
+#[path = "../candelabra/stop.rs"]
 mod stop;
 
 use arguments::{Arguments, StatsForm};
@@ -11,7 +15,7 @@ use clap::Parser;
 use display::Display;
 use std::io::Write;
 use std::process::ExitCode;
-use stop::Stop;
+use stop::{STOPPED, Stop};
 
 /// Some frames failed, or nothing could be rendered at all.
 const FAILED: u8 = 1;
@@ -19,8 +23,6 @@ const FAILED: u8 = 1;
 const USAGE: u8 = 2;
 /// The tree file is stale or broken.
 const BAD_TREE: u8 = 3;
-/// A signal stopped the job: this and the signal's number, as a shell has it.
-const STOPPED: u8 = 128;
 
 fn main() -> ExitCode {
     let arguments = Arguments::parse();
@@ -41,9 +43,9 @@ fn run(arguments: &Arguments) -> anyhow::Result<u8> {
     if let Some(threads) = arguments.threads {
         rayon::ThreadPoolBuilder::new().num_threads(threads.into()).build_global()?;
     }
+    lost_pages::explain(BAD_TREE.into())?;
     let stop = Stop::listen()?;
-    let asked = stop.clone();
-    let display = Display::new(arguments.progress, move || asked.signal().is_some());
+    let display = Display::new(arguments.progress, &stop);
     let report = arguments.job().run(&display)?;
     drop(display);
     if let Some(form) = arguments.stats {

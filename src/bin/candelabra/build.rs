@@ -1,18 +1,16 @@
 //! `candelabra build`: a scene in, a tree file out.
 
-use crate::texture_bar::TextureBar;
-use anyhow::{Context, Result, bail};
-use candelabra::emitter::Emitters;
-use candelabra::light_tree::LightTree;
-use candelabra::page::{Lines, Plain, counted};
-use candelabra::pipeline::{self, OpenedTree, Rebuilt, Standing, Strict, Survey, TreeError};
+use crate::display::{Display, Progress};
+use crate::stop::{STOPPED, Stop};
+use anyhow::Result;
+use candelabra::page::{Lines, counted};
+use candelabra::pipeline::{BreakEven, BuildError, BuildJob, BuildReport, Built, Strict};
 use candelabra::render::frames::Frames;
-use candelabra::scene::Scene;
-use candelabra::store::{AlignedBytes, check_writable, write_atomically};
 use clap::Args;
 use std::io::Write;
-use std::path::{Path, PathBuf};
-use std::time::{Duration, Instant};
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::time::Duration;
 
 #[derive(Args)]
 pub struct Arguments {
@@ -43,211 +41,92 @@ pub struct Arguments {
     /// --strict=lights,cameras (lights, materials, geometry, cameras, animation, other)
     #[arg(long, value_name = "CATEGORIES", num_args = 0..=1, require_equals = true, default_missing_value = Strict::EVERYTHING)]
     strict: Option<Strict>,
+    #[command(flatten)]
+    progress: Progress,
 }
 
-pub fn run(arguments: &Arguments) -> Result<()> {
-    let started = Instant::now();
+pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     if let Some(threads) = arguments.threads {
         rayon::ThreadPoolBuilder::new().num_threads(threads.into()).build_global()?;
     }
-    let output = arguments.output.clone().unwrap_or(arguments.scene.with_extension("ltree"));
-    // An output that is there may be up to date, and need no writing.
-    if !output.is_file() {
-        check_writable(&output)?;
-    }
-    let mut out = Lines(std::io::stdout().lock());
-
-    let load = || {
-        let (loaded, loading) = timed(|| pipeline::load_scene(&arguments.scene));
-        loaded.map(|scene| (scene, loading))
+    let Arguments { scene, output, frames, force_light, base, force, strict, .. } = arguments;
+    let job = BuildJob {
+        scene: scene.clone(),
+        output: output.clone(),
+        frames: frames.clone(),
+        force_light: force_light.clone(),
+        base: base.clone(),
+        force: *force,
+        strict: strict.clone(),
     };
-    // While the scene is read, the output as it is and the base are verified.
-    let open = || {
-        let before = if arguments.force { None } else { Base::open(&output).ok() };
-        (before, arguments.base.as_deref().map(Base::open))
-    };
-    let (loaded, (before, base)) = rayon::join(load, open);
-    let (mut scene, loading) = loaded?;
-    for note in &scene.notes {
-        eprintln!("note: {}", Plain(note));
-    }
-    if let Some(strict) = &arguments.strict {
-        strict.check(&scene)?;
-    }
-    let named = || arguments.scene.display().to_string();
-    pipeline::force_lights(&mut scene, &arguments.force_light).with_context(named)?;
-    let real = |path: &Path| path.canonicalize().ok();
-    if scene
-        .files
-        .iter()
-        .any(|input| real(&input.path).is_some() && real(&input.path) == real(&output))
-    {
-        bail!("{}: is the scene's own file; choose another output", output.display());
-    }
-    pipeline::check_output(&output)?;
-    let (emitters, collecting) = timed(|| collect(&scene));
-    let frames = match &arguments.frames {
-        Some(frames) => {
-            let mut frames = frames.as_slice().to_vec();
-            frames.sort_unstable();
-            frames
+    let stop = Stop::listen()?;
+    let display = Display::new(arguments.progress, &stop);
+    let report = match job.run(&display) {
+        Err(BuildError::Stopped) => {
+            eprintln!("candelabra: {}", BuildError::Stopped);
+            return Ok((STOPPED + stop.signal().unwrap_or_default()).into());
         }
-        None => pipeline::frames_of(&scene),
+        report => report?,
     };
-    let (survey, surveying) = timed(|| pipeline::survey(&scene, &emitters, &frames));
-    let survey = survey.with_context(named)?;
+    drop(display);
+    print(&mut Lines(std::io::stdout().lock()), &job, &report)?;
+    Ok(ExitCode::SUCCESS)
+}
+
+fn print(out: &mut impl Write, job: &BuildJob, report: &BuildReport) -> Result<()> {
     writeln!(
         out,
         "{}: {}, {} ({} change), read in {}",
-        arguments.scene.display(),
-        counted(survey.lights.len(), "light"),
-        counted(emitters.len(), "emitter"),
-        emitters.changing_count(),
-        Seconds(loading),
+        job.scene.display(),
+        counted(report.lights, "light"),
+        counted(report.emitters, "emitter"),
+        report.changing,
+        Seconds(report.reading),
     )?;
-    let before = match before.map(|before| (pipeline::standing(&before.tree, &survey), before)) {
-        Some((Standing::UpToDate, _)) => {
-            writeln!(out, "{}: up to date", output.display())?;
-            return Ok(());
-        }
-        Some((Standing::Contradicts(what), before)) => {
-            let what = format!("{}: contradicts the scene: {what}", before.path.display());
-            eprintln!("note: {}; built from the scene alone", Plain(what));
-            None
-        }
-        Some((Standing::OutOfDate, before)) => Some(before),
-        None => None,
+    let output = report.output.display();
+    let Some(built) = &report.built else {
+        writeln!(out, "{output}: up to date")?;
+        return Ok(());
     };
-    check_writable(&output)?;
-    let base = match base {
-        None => before,
-        Some(Ok(base)) => Some(base),
-        Some(Err(error)) => {
-            eprintln!("note: not built upon {}", Plain(error));
-            None
-        }
-    };
-    let (built, building) = timed(|| build(&survey, base, &mut out));
-    let Built { bytes, is_partial } = built?;
-    let (written, writing) = timed(|| {
-        // Only a verified tree may replace the old file.
-        let tree = LightTree::open(bytes).and_then(|tree| tree.verify().map(|()| tree));
-        let tree = tree.with_context(|| format!("{}: not written", output.display()))?;
-        let bytes = tree.into_bytes();
-        write_atomically(&output, |file| file.write_all(bytes.as_ref()))?;
-        anyhow::Ok(bytes.as_ref().len())
-    });
-    let size = written?;
-    let each = size as f64 / emitters.len().max(1) as f64;
-    writeln!(out, "{}: {size} bytes, {each:.1} an emitter", output.display())?;
+    if let Some(base) = &built.taken_over {
+        writeln!(
+            out,
+            "{}: {} of {} leaves taken over, opened and verified in {}",
+            base.base.display(),
+            base.reused,
+            base.leaves,
+            Seconds(base.opening)
+        )?;
+    }
+    let Built { bytes, collecting, surveying, building, writing, break_even, .. } = built;
+    let each = *bytes as f64 / report.emitters.max(1) as f64;
+    writeln!(out, "{output}: {bytes} bytes, {each:.1} an emitter")?;
     writeln!(
         out,
         "emitters found in {}, surveyed in {}, trees built in {}, written in {}",
-        Seconds(collecting),
-        Seconds(surveying),
-        Seconds(building),
-        Seconds(writing)
+        Seconds(*collecting),
+        Seconds(*surveying),
+        Seconds(*building),
+        Seconds(*writing)
     )?;
-    if is_partial {
-        return Ok(());
-    }
-    // Somebody else may have written another tree there since.
-    let Ok(with) = with_file(arguments, &scene, &output) else { return Ok(()) };
-    let without = match survey.frames.len() {
-        0 | 1 => collecting + surveying + building,
-        _ => collecting + without_file(&scene, &emitters, frames[0])?,
-    };
-    report(&mut out, started.elapsed(), without, with)
+    break_even.map_or(Ok(()), |break_even| print_break_even(out, &break_even))
 }
 
-fn timed<T>(work: impl FnOnce() -> T) -> (T, Duration) {
-    let started = Instant::now();
-    let done = work();
-    (done, started.elapsed())
-}
-
-/// The emitters of a scene, computed without a tree file, with a progress bar if that takes long.
-fn collect(scene: &Scene) -> Emitters {
-    let bar = TextureBar::new();
-    pipeline::collect_emitters(scene, None::<&OpenedTree>, &|done, all| bar.show(done, all))
-}
-
-/// The time that a process with the file spends on lights, between reading the scene and its first frame.
-fn with_file(arguments: &Arguments, scene: &Scene, output: &Path) -> Result<Duration, TreeError> {
-    let (checked, with) = timed(|| {
-        let tree = pipeline::open_tree(output, true)?;
-        let emitters = pipeline::collect_emitters(scene, Some(&tree), &|_, _| {});
-        pipeline::check_fresh(&tree, output, scene, &emitters, &arguments.force_light, true)
-    });
-    checked?;
-    Ok(with)
-}
-
-/// The time that a process without the file spends on the tree of one frame.
-fn without_file(scene: &Scene, emitters: &Emitters, frame: i32) -> Result<Duration> {
-    let (survey, surveying) = timed(|| pipeline::survey(scene, emitters, &[frame]));
-    let survey = survey?;
-    let (_, building) = timed(|| pipeline::build_tree(&survey));
-    Ok(surveying + building)
-}
-
-/// Reports after how many processes the file has paid for itself. `made` is the time of this process,
-/// `without` and `with` are those of a render without and with the file.
-fn report(out: &mut impl Write, made: Duration, without: Duration, with: Duration) -> Result<()> {
+/// Prints after how many processes the file has paid for itself.
+fn print_break_even(out: &mut impl Write, break_even: &BreakEven) -> Result<()> {
     write!(
         out,
         "before its first frame a process spends {} on lights without the file, {} with it",
-        Seconds(without),
-        Seconds(with)
+        Seconds(break_even.without),
+        Seconds(break_even.with)
     )?;
-    match without.checked_sub(with) {
-        Some(saved) if !saved.is_zero() => {
-            let processes = (made.as_secs_f64() / saved.as_secs_f64()).ceil().max(1.0);
-            writeln!(out, ": the file has paid for itself with process number {processes:.0}")?;
+    match break_even.processes() {
+        Some(number) => {
+            writeln!(out, ": the file has paid for itself with process number {number}")?;
         }
-        _ => writeln!(out, ": the file saves no time and serves as a record")?,
+        None => writeln!(out, ": the file saves no time and serves as a record")?,
     }
     Ok(())
-}
-
-/// An earlier tree file, opened.
-struct Base {
-    path: PathBuf,
-    tree: OpenedTree,
-    opening: Duration,
-}
-
-impl Base {
-    fn open(path: &Path) -> Result<Base, TreeError> {
-        let (tree, opening) = timed(|| pipeline::open_base(path));
-        Ok(Base { path: path.into(), tree: tree?, opening })
-    }
-}
-
-/// The bytes of a file, and whether part of it was taken over from a base.
-struct Built {
-    bytes: AlignedBytes,
-    is_partial: bool,
-}
-
-fn build(survey: &Survey, base: Option<Base>, out: &mut impl Write) -> Result<Built> {
-    let Some(Base { path, tree, opening }) = base else {
-        return Ok(Built { bytes: pipeline::build_tree(survey), is_partial: false });
-    };
-    let Rebuilt { bytes, reused, leaves, base_contradicts } = pipeline::rebuild_tree(survey, &tree);
-    let path = path.display();
-    if base_contradicts {
-        eprintln!(
-            "note: not built upon {path}: it contradicts the scene in lights that have not changed"
-        );
-    } else {
-        writeln!(
-            out,
-            "{path}: {reused} of {leaves} leaves taken over, opened and verified in {}",
-            Seconds(opening)
-        )?;
-    }
-    Ok(Built { bytes, is_partial: reused > 0 })
 }
 
 /// A duration with three digits.

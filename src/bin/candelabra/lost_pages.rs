@@ -6,7 +6,8 @@ use signal_hook::consts::SIGBUS;
 use signal_hook::low_level;
 use std::io;
 
-const WORDS: &[u8] = b"candelabra: a tree file was cut short or overwritten while it was in use, or its disk \
+const WORDS: &[u8] =
+    b"candelabra: a tree file was cut short or overwritten while it was in use, or its disk \
     failed; publish a tree under another name and rename it over the old one, then start again: \
     candelabra-render keeps finished frames under --resume\n";
 

@@ -2,14 +2,17 @@
 
 mod build;
 mod diff;
+mod display;
 mod farm;
 mod inspect;
+mod lost_pages;
 mod measure;
 mod page;
 mod race;
 mod run;
 mod run_display;
 mod shot;
+mod stop;
 mod texture_bar;
 mod verify;
 
@@ -46,14 +49,19 @@ enum Command {
     Verify(verify::Arguments),
 }
 
+const FAILED: u8 = 1;
 /// Usage; mostly said by clap.
 const USAGE: u8 = 2;
 
 fn main() -> ExitCode {
     let command = Arguments::parse().command;
+    if let Err(error) = lost_pages::explain(i32::from(FAILED)) {
+        eprintln!("candelabra: {error}");
+        return FAILED.into();
+    }
     let done = |()| ExitCode::SUCCESS;
     let outcome = match &command {
-        Command::Build(arguments) => build::run(arguments).map(done),
+        Command::Build(arguments) => build::run(arguments),
         Command::Diff(arguments) => diff::run(arguments),
         Command::Farm(arguments) => farm::run(arguments).map(done),
         Command::Inspect(arguments) => inspect::run(arguments).map(done),

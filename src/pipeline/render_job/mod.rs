@@ -22,20 +22,16 @@ mod writer;
 pub use error::RenderError;
 pub use report::{FrameCounts, RenderReport, SceneCounts, Seconds};
 
-use super::{
-    Event, OpenedTree, PreviewStamp, ShotTrees, Stamp, Strict, TreeError, TreeFile, View, Watch,
-    collect_emitters, open_tree,
-};
-use crate::emitter::Emitters;
+use super::{Event, PreviewStamp, Stamp, Strict, TreeChoice, View, Watch, with_trees};
 use crate::render::RenderSettings;
 use crate::render::frame_names::FrameNames;
 use crate::render::frames::Frames;
-use crate::scene::{Medium, Scene};
+use crate::scene::Medium;
 use clock::Clock;
 use outputs::Outputs;
 use pass::Pass;
 use shot::Shot;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use writer::{Writer, Writing};
 
 /// A shot to be rendered.
@@ -100,62 +96,43 @@ impl RenderJob {
         clock.lap(|seconds| &mut seconds.scene);
 
         tell_stage(watch, "looking at the light tree");
-        let file = match &self.tree {
-            Some(path) => Some((open_tree(path, false)?, path.as_path())),
-            None => None,
+        let choice = TreeChoice {
+            file: self.tree.clone(),
+            forced: self.force_lights.clone(),
+            verify: self.verify,
         };
-        let file = file.as_ref().map(|(tree, path)| (tree, *path));
-        let emitters = self.emitters(&shot.scene, file.map(|(tree, _)| tree), watch);
-        let trees = (self.trees(&shot.scene, &emitters, file)?, file);
-        clock.lap(|seconds| &mut seconds.trees);
-
-        let writing = Writing { job: self, outputs: &outputs, watch };
-        let (frames, written) = std::thread::scope(|scope| {
-            let writer = Writer::start(scope, writing);
-            let pass = Pass::new(self, &shot, &emitters, trees, &outputs, watch, &mut clock);
-            let frames = pass.and_then(|mut pass| pass.render_all(&writer));
-            (frames, writer.finish())
-        });
+        let textures = |done: u64, all: u64| {
+            let percent = 100 * done / all.max(1);
+            tell_stage(watch, &format!("integrating textures, {percent} %"));
+        };
+        let (frames, written, scene) =
+            with_trees(&shot.scene, &choice, &textures, |emitters, trees| {
+                clock.lap(|seconds| &mut seconds.trees);
+                let counts = shot.count(emitters, &trees);
+                let writing = Writing { job: self, outputs: &outputs, watch };
+                let (frames, written) = std::thread::scope(|scope| {
+                    let writer = Writer::start(scope, writing);
+                    let pass = Pass::new(self, &shot, emitters, trees, &outputs, watch, &mut clock);
+                    let frames = pass.and_then(|mut pass| pass.render_all(&writer));
+                    (frames, writer.finish())
+                });
+                Ok::<_, RenderError>((frames?, written, counts))
+            })?;
         clock.lap(|seconds| &mut seconds.waiting);
-        let mut frames = frames?;
-        frames.done += written.frames.done;
-        frames.failed += written.frames.failed;
-        let left = frames.asked - frames.done - frames.up_to_date - frames.failed;
+        let frames = FrameCounts {
+            done: written.frames.done,
+            failed: frames.failed + written.frames.failed,
+            ..frames
+        };
         Ok(RenderReport {
+            stopped: frames.asked > frames.done + frames.up_to_date + frames.failed,
             frames,
             seconds: Seconds { writing: written.seconds, ..clock.finish() },
             rays: written.trace.rays,
             light_picks: written.trace.light_picks,
             non_finite_samples: written.non_finite,
-            scene: SceneCounts {
-                lights: emitters.lights().len(),
-                emitters: emitters.len(),
-                triangles: shot.triangles(),
-                tree_file_bytes: file.map(|(tree, _)| tree.byte_length()),
-            },
-            stopped: left > 0,
+            scene,
         })
-    }
-
-    /// What shines in the scene.
-    fn emitters(&self, scene: &Scene, tree: Option<&OpenedTree>, watch: &dyn Watch) -> Emitters {
-        let progress = |done: u64, all: u64| {
-            let percent = 100 * done / all.max(1);
-            tell_stage(watch, &format!("integrating textures, {percent} %"));
-        };
-        collect_emitters(scene, tree, &progress)
-    }
-
-    /// The trees: from the file, or built.
-    fn trees<'a>(
-        &'a self,
-        scene: &'a Scene,
-        emitters: &'a Emitters,
-        file: Option<(&'a OpenedTree, &'a Path)>,
-    ) -> Result<ShotTrees<'a>, TreeError> {
-        let Some((tree, path)) = file else { return ShotTrees::built(scene, emitters) };
-        let (tree, forced) = (tree.by_reference(), self.force_lights.as_slice());
-        ShotTrees::of_file(scene, emitters, TreeFile { tree, path, forced, verify: self.verify })
     }
 
     /// The stamp of the preview of a picture.

@@ -8,11 +8,10 @@ use super::writer::{Finished, Writer, write_preview};
 use super::{RenderError, RenderJob, exposure};
 use crate::emitter::Emitters;
 use crate::pipeline::{
-    Event, OpenedTree, PreviewStamp, ShotTrees, Stamp, Stamper, TreeError, Watch, frames_of,
+    Event, PreviewStamp, ShotTrees, Stamp, Stamper, TreeError, Watch, frames_of,
 };
 use crate::render::beauty::Beauty;
 use crate::render::{self, PlanError, Progress, RenderDelegate};
-use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 
 /// One pass over the frames of a shot.
@@ -21,8 +20,6 @@ pub(super) struct Pass<'a> {
     shot: &'a Shot,
     emitters: &'a Emitters,
     trees: ShotTrees<'a>,
-    /// The file that the trees are taken from, if there is one, and its path.
-    file: Option<(&'a OpenedTree, &'a Path)>,
     outputs: &'a Outputs<'a>,
     stamper: Stamper,
     watch: &'a dyn Watch,
@@ -77,7 +74,7 @@ impl<'a> Pass<'a> {
         job: &'a RenderJob,
         shot: &'a Shot,
         emitters: &'a Emitters,
-        (trees, file): (ShotTrees<'a>, Option<(&'a OpenedTree, &'a Path)>),
+        trees: ShotTrees<'a>,
         outputs: &'a Outputs<'a>,
         watch: &'a dyn Watch,
         clock: &'a mut Clock,
@@ -92,7 +89,6 @@ impl<'a> Pass<'a> {
             shot,
             emitters,
             trees,
-            file,
             outputs,
             stamper: stamper.map_err(RenderError::Program)?,
             watch,
@@ -154,20 +150,10 @@ impl<'a> Pass<'a> {
             rendered => rendered?,
         };
         let seconds = self.clock.lap(|seconds| &mut seconds.rendering);
-        self.check_file()?;
+        self.trees.check_unwritten()?;
         writer.hand_over(Finished { rendered, stamp, seconds, exposure });
         self.clock.lap(|seconds| &mut seconds.waiting);
         Ok(Outcome::HandedOver)
-    }
-
-    /// Makes sure that what was checked of the tree file is what was sampled.
-    fn check_file(&self) -> Result<(), TreeError> {
-        match self.file {
-            Some((tree, path)) if !tree.data().is_unchanged() => {
-                Err(TreeError::Overwritten { path: path.into() })
-            }
-            _ => Ok(()),
-        }
     }
 
     /// Stops of previews, if there are any.

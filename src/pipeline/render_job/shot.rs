@@ -1,7 +1,10 @@
 //! What is read once for a shot.
 
-use super::{RenderError, RenderJob};
-use crate::pipeline::{ASPECT, Event, Watch, force_lights, frames_of, load_scene, look, option};
+use super::{RenderError, RenderJob, SceneCounts};
+use crate::emitter::Emitters;
+use crate::pipeline::{
+    ASPECT, Event, ShotTrees, Watch, force_lights, frames_of, load_scene, look, option,
+};
 use crate::render::RenderSettings;
 use crate::render::frames::Frames;
 use crate::scene::{Camera, Scene};
@@ -38,10 +41,15 @@ impl Shot {
         Ok(Shot { scene, camera, frames, settings })
     }
 
-    /// Triangles of all instances.
-    pub fn triangles(&self) -> u64 {
+    /// What it consists of.
+    pub fn count(&self, emitters: &Emitters, trees: &ShotTrees) -> SceneCounts {
         let meshes = self.scene.instances.iter().map(|instance| instance.mesh as usize);
-        meshes.map(|mesh| self.scene.meshes[mesh].triangles.len() as u64).sum()
+        SceneCounts {
+            lights: emitters.lights().len(),
+            emitters: emitters.len(),
+            triangles: meshes.map(|mesh| self.scene.meshes[mesh].triangles.len() as u64).sum(),
+            tree_file_bytes: trees.file_length(),
+        }
     }
 }
 

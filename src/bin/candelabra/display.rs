@@ -1,8 +1,9 @@
 //! What the user or the farm sees of a job: bars, lines, or a protocol.
 
+use crate::stop::Stop;
 use candelabra::page::Plain;
 use candelabra::pipeline::{Event, Watch};
-use clap::ValueEnum;
+use clap::{Args, ValueEnum};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::io::{IsTerminal, Write};
 use std::sync::mpsc::{RecvTimeoutError, Sender, channel};
@@ -26,6 +27,20 @@ pub enum Form {
     None,
 }
 
+/// The option that chooses one.
+#[derive(Args, Clone, Copy, Debug)]
+pub struct Progress {
+    /// How progress is shown
+    #[arg(
+        long = "progress",
+        value_enum,
+        default_value_t,
+        env = "CANDELABRA_PROGRESS",
+        value_name = "FORM"
+    )]
+    pub form: Form,
+}
+
 /// Farms take a silent program for a dead one.
 const LONGEST_SILENCE: Duration = Duration::from_secs(55);
 /// Steps of a bar.
@@ -35,7 +50,7 @@ const STEPS: u64 = 10_000;
 pub struct Display {
     shared: Arc<Shared>,
     heart: Option<(Sender<()>, JoinHandle<()>)>,
-    is_stopped: Box<dyn Fn() -> bool + Sync>,
+    stop: Stop,
 }
 
 struct Shared {
@@ -56,8 +71,8 @@ struct State {
 }
 
 impl Display {
-    /// A display that asks `is_stopped` whether the job should stop.
-    pub fn new(form: Form, is_stopped: impl Fn() -> bool + Sync + 'static) -> Display {
+    /// A display that hears when the job should stop.
+    pub fn new(Progress { form }: Progress, stop: &Stop) -> Display {
         let bar = match form == Form::Auto && std::io::stderr().is_terminal() {
             true => ProgressBar::new(STEPS),
             false => ProgressBar::hidden(),
@@ -71,7 +86,7 @@ impl Display {
         let shared = Arc::new(Shared { form, bar, state: Mutex::new(state) });
         let speaks = form != Form::None && shared.bar.is_hidden();
         let heart = speaks.then(|| beat(shared.clone()));
-        Display { shared, heart, is_stopped: Box::new(is_stopped) }
+        Display { shared, heart, stop: stop.clone() }
     }
 }
 
@@ -105,7 +120,7 @@ impl Watch for Display {
     }
 
     fn is_stopped(&self) -> bool {
-        (self.is_stopped)()
+        self.stop.signal().is_some()
     }
 }
 
@@ -216,9 +231,6 @@ fn line_of(event: &Event) -> Option<String> {
         )),
         Event::UpToDate { frame: Some(frame), output } => {
             Some(format!("frame {frame}: {} is up to date", output.display()))
-        }
-        Event::UpToDate { frame: None, output } => {
-            Some(format!("{}: up to date", output.display()))
         }
         _ => None,
     }

@@ -1,0 +1,34 @@
+//! Signals: what stops a job.
+
+use signal_hook::consts::{SIGINT, SIGTERM};
+use signal_hook::flag;
+use std::io;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering::Relaxed};
+
+/// The exit code of a job that a signal has stopped is this and the signal's number, as a shell has it.
+pub const STOPPED: u8 = 128;
+
+/// The signal that asked for a stop, if one did.
+#[derive(Clone)]
+pub struct Stop(Arc<AtomicUsize>);
+
+impl Stop {
+    /// Listens for Ctrl-C and SIGTERM, also where a shell has made the process deaf to the former. The first is
+    /// noticed; a second one ends the process at once, with the same code.
+    pub fn listen() -> io::Result<Stop> {
+        let (signal, again) = (Arc::new(AtomicUsize::new(0)), Arc::new(AtomicBool::new(false)));
+        for number in [SIGINT, SIGTERM] {
+            // In this order: the first signal does not yet find the flag set.
+            flag::register_conditional_shutdown(number, 128 + number, again.clone())?;
+            flag::register(number, again.clone())?;
+            flag::register_usize(number, signal.clone(), number as usize)?;
+        }
+        Ok(Stop(signal))
+    }
+
+    /// The number of the signal.
+    pub fn signal(&self) -> Option<u8> {
+        u8::try_from(self.0.load(Relaxed)).ok().filter(|&signal| signal > 0)
+    }
+}
