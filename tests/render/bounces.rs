@@ -39,7 +39,7 @@ fn assert_white(what: &str, buffers: &RenderBuffers, [mean_off, pixel_off]: [f64
     let Estimate { mean, error } = estimate;
     assert!(error.max_element() < 3.5e-3, "{what}: {estimate} is too noisy to tell");
     assert!((mean.x - 1.0).abs() < mean_off + 4.0 * error.x, "{what}: {estimate}");
-    for (i, pixel) in pixels(&buffers).iter().enumerate() {
+    for (i, pixel) in pixels(buffers).iter().enumerate() {
         let (value, noise) = (f64::from(pixel.beauty.x), f64::from(pixel.variance.x).sqrt());
         assert!((value - 1.0).abs() < pixel_off + 6.0 * noise, "{what}, pixel {i}: {value}");
     }
