@@ -9,9 +9,21 @@ from __future__ import annotations
 import fcntl
 import os
 import tempfile
+import time
 from pathlib import Path
 
 PREFIX, SUFFIX = ".candelabra-", ".part"
+_LONGEST_WRITE_S = 24 * 3600
+_TRIES = 8
+
+
+def _own_prefix() -> str:
+    """The prefix, and what tells this machine, since it was started, from others."""
+    try:
+        boot = Path("/proc/sys/kernel/random/boot_id").read_text()
+    except OSError:
+        boot = ""
+    return f"{PREFIX}{boot.split('-')[0].strip()}-"
 
 
 def write_atomically(path: Path, data: bytes) -> None:
@@ -19,10 +31,9 @@ def write_atomically(path: Path, data: bytes) -> None:
     open as the user's mask allows."""
     path.parent.mkdir(parents=True, exist_ok=True)
     sweep(path.parent)
-    handle, temporary = tempfile.mkstemp(prefix=PREFIX, suffix=SUFFIX, dir=path.parent)
+    file, temporary = _temporary_file(path.parent)
     try:
-        with os.fdopen(handle, "wb") as file:
-            _lock(file)
+        with file:
             file.write(data)
             file.flush()
             mask = os.umask(0)
@@ -36,10 +47,27 @@ def write_atomically(path: Path, data: bytes) -> None:
         raise
 
 
+def _temporary_file(folder: Path):
+    """A locked file and its name. A sweeper may come between its making and its lock, but not many
+    times in a row."""
+    for _ in range(_TRIES):
+        handle, name = tempfile.mkstemp(prefix=_own_prefix(), suffix=SUFFIX, dir=folder)
+        file = os.fdopen(handle, "wb")
+        _lock(file)
+        if os.path.exists(name):
+            return file, name
+        file.close()
+    raise OSError(f"{folder}: another program removes temporary files as fast as they are made")
+
+
 def sweep(folder: Path) -> None:
-    """Remove the temporary files in a folder that dead writers have left."""
+    """Remove the temporary files in a folder that dead writers have left; those of other machines,
+    whose locks may not be seen here, when they are a day old."""
     for path in folder.glob(f"{PREFIX}*{SUFFIX}"):
         try:
+            is_own = path.name.startswith(_own_prefix())
+            if not is_own and time.time() - path.stat().st_mtime < _LONGEST_WRITE_S:
+                continue
             with path.open("rb") as file:
                 if path.is_file() and not path.is_symlink() and _lock(file):
                     path.unlink()

@@ -213,6 +213,8 @@ impl BuildJob {
             built: None,
             output,
         };
+        // What somebody has written to since it was verified is not what was verified.
+        let before = before.filter(|before| before.tree.data().is_unchanged());
         let before = match before.map(|before| (standing(&before.tree, &survey), before)) {
             Some((Standing::UpToDate, _)) => {
                 let output = report.output.clone();
@@ -357,6 +359,12 @@ fn build(
         return (build_tree(survey), None);
     };
     let Rebuilt { bytes, reused, leaves, base_contradicts } = rebuild_tree(survey, &tree);
+    if !tree.data().is_unchanged() {
+        let base = base.display();
+        let text = format!("not built upon {base}: it was written to meanwhile");
+        watch.tell(Event::Note { text });
+        return (build_tree(survey), None);
+    }
     if base_contradicts {
         let base = base.display();
         let text = format!(

@@ -13,7 +13,7 @@ use super::exr_header::sort_attributes;
 use super::layers::SampleType;
 use crate::store::{BLANK, is_sealed, read_regular, set_seal, write_atomically};
 use exr::block::reader::Reader;
-use exr::block::writer::ChunksWriter;
+use exr::block::writer::{ChunksWriter, ParallelBlocksCompressor};
 use exr::block::{BlockIndex, UncompressedBlock};
 use exr::compression::Compression;
 use exr::meta::attribute::{AttributeValue, ChannelDescription, IntegerBounds, LineOrder, Text};
@@ -48,15 +48,35 @@ fn encode(buffers: &RenderBuffers, metadata: &str) -> io::Result<Vec<u8>> {
     exr::block::write(&mut file, headers, true, |meta, chunks| {
         let blocks = meta.collect_ordered_blocks(|index| channels.block(&meta, index));
         let chunks = chunks.on_progress(|_| ());
-        // Crate exr starts threads of its own, as many as there are cores.
-        match rayon::current_num_threads() {
-            1 => chunks.compress_all_blocks_sequential(&meta, blocks),
-            _ => chunks.compress_all_blocks_parallel(&meta, blocks),
-        }
+        compress(&meta, chunks, blocks)
     })
     .map_err(into_io)?;
     sort_attributes(&mut file)?;
     Ok(file.into_inner())
+}
+
+/// Compresses blocks and writes them. By threads of their own, since another frame may be rendered
+/// meanwhile, but by no more than render.
+fn compress(
+    meta: &MetaData,
+    mut chunks: impl ChunksWriter,
+    blocks: impl Iterator<Item = (usize, UncompressedBlock)>,
+) -> exr::error::UnitResult {
+    let threads = rayon::current_num_threads();
+    let pool = || rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+    let own = if threads > 1 {
+        ParallelBlocksCompressor::new_with_thread_pool(meta, &mut chunks, pool)
+    } else {
+        None
+    };
+    let Some(mut compressor) = own else {
+        return chunks.compress_all_blocks_sequential(meta, blocks);
+    };
+    for (index, block) in blocks {
+        compressor.add_block_to_compression_queue(index, block)?;
+    }
+    // The last block waits for all others.
+    Ok(())
 }
 
 /// The JSON text of a file that [`write_exr`] made, if every byte of the file is as it was written. `None`

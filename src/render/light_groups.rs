@@ -98,21 +98,23 @@ impl LightGroups {
             return Err(LightGroupError::NoLight { name, pattern });
         }
         let named = entries.iter().chain(infinite.iter().flatten()).map(String::as_str);
-        let mut numbers: BTreeMap<&str, u16> =
-            named.chain([DEFAULT]).map(|name| (name, 0)).collect();
+        // In the order of a file's channels, in whose names a dot comes behind the group's.
+        let channel = |name: &str| format!("{name}.");
+        let mut numbers: BTreeMap<String, u16> =
+            named.chain([DEFAULT]).map(|name| (channel(name), 0)).collect();
         if numbers.len() > MOST_GROUPS {
             return Err(LightGroupError::TooMany(numbers.len()));
         }
         (0..).zip(numbers.values_mut()).for_each(|(number, own)| *own = number);
-        let number = |name: &String| numbers[name.as_str()];
+        let number = |name: &String| numbers[&channel(name)];
         Ok(LightGroups {
-            names: numbers.keys().map(|name| name.to_string()).collect(),
+            names: numbers.keys().map(|name| name[..name.len() - 1].to_string()).collect(),
             of_entry: entries.iter().map(number).collect(),
             of_light: infinite.iter().map(|name| name.as_ref().map_or(0, number)).collect(),
         })
     }
 
-    /// Names of the groups, ascending by bytes: the order of their layers, and of a file's channels.
+    /// Names of the groups, in the order of their layers, which is that of a file's channels.
     pub fn names(&self) -> &[String] {
         &self.names
     }

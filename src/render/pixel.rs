@@ -146,7 +146,7 @@ impl PixelMean {
                 }
                 Aov::Variance => {
                     let degrees = count * (count - 1.0).max(1.0);
-                    values.extend((self.spread / degrees * (scale * scale)).as_vec3().to_array());
+                    values.extend(brief(self.spread / degrees * (scale * scale)).to_array());
                 }
                 Aov::SampleCount => values.push(self.count as f32),
             }

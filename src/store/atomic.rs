@@ -9,6 +9,8 @@
 //! stops) cannot clean up: its temporary file, `.candelabra-*.part` in the output's folder, stays. Nothing
 //! reads it and no later writer takes its name. Writers hold a lock on their temporary files, which the
 //! system drops when they die; so [`sweep`] can tell the files that nobody writes any more, and removes them.
+//! Not every file system carries locks from machine to machine. So the name tells the machine, and files of
+//! others are swept only when they are a day old.
 //!
 //! Long work should not fail only when its output is written: [`check_writable`] tests beforehand, as far
 //! as possible, whether that will succeed.
@@ -16,11 +18,22 @@
 use std::fs::{self, File, TryLockError};
 use std::io::{self, BufWriter, Write};
 use std::path::Path;
+use std::sync::LazyLock;
+use std::time::Duration;
 use tempfile::{Builder, NamedTempFile};
 
 /// How temporary files are named.
 const PREFIX: &str = ".candelabra-";
 const SUFFIX: &str = ".part";
+/// `.candelabra-` and what tells this machine, since it was started, from others.
+static OWN_PREFIX: LazyLock<String> = LazyLock::new(|| {
+    let boot = fs::read_to_string("/proc/sys/kernel/random/boot_id").unwrap_or_default();
+    format!("{PREFIX}{}-", boot.trim().split('-').next().unwrap_or_default())
+});
+/// No writer works on one file for longer.
+const LONGEST_WRITE: Duration = Duration::from_secs(24 * 3600);
+/// What is written to find out whether anything can be.
+const TRIAL_BYTES: u64 = 64 << 10;
 
 /// Writes a file through `write`, all or nothing. Parent folders are created.
 ///
@@ -44,12 +57,12 @@ pub fn write_atomically(
 
 /// Checks that a small file can be written; see [`check_room`].
 pub fn check_writable(path: &Path) -> io::Result<()> {
-    check_room(path, 1)
+    check_room(path, 0)
 }
 
-/// Checks that a file of some bytes can be written: no folder or device has its name, and a temporary file
-/// of that length can be written in its folder or, if that does not exist, in the nearest one above that
-/// does. Nothing is left behind. Errors name the path and the remedy.
+/// Checks that a file of some bytes can be written: no folder or device has its name, and in its folder or,
+/// if that does not exist, in the nearest one above that does, a small temporary file can be written and the
+/// file system has room for the bytes. Nothing is left behind. Errors name the path and the remedy.
 pub fn check_room(path: &Path, bytes: u64) -> io::Result<()> {
     check(path, bytes).map_err(|error| {
         let problem =
@@ -74,19 +87,36 @@ fn check(path: &Path, bytes: u64) -> io::Result<()> {
         folder = folder_of(folder);
     }
     let mut temporary = temporary_file(folder)?;
-    io::copy(&mut io::Read::take(io::repeat(0), bytes), &mut temporary)?;
-    temporary.flush()
+    temporary.write_all(&[0x5a; TRIAL_BYTES as usize])?;
+    temporary.flush()?;
+    match room(temporary.as_file()) {
+        Some(room) if room < bytes => {
+            let problem = format!("{bytes} bytes are needed, and {room} are free");
+            Err(io::Error::new(io::ErrorKind::StorageFull, problem))
+        }
+        _ => Ok(()),
+    }
 }
 
-/// Removes the temporary files in a folder that killed writers have left. Those of writers that live, on
-/// this machine or, if the file system's locks reach that far, on another, stay. Errors are ignored: the
-/// files are in nobody's way.
+/// Bytes that are free where a file is, if the system tells.
+fn room(file: &File) -> Option<u64> {
+    #[cfg(unix)]
+    return rustix::fs::fstatvfs(file).ok().map(|disk| disk.f_bavail.saturating_mul(disk.f_frsize));
+    #[cfg(not(unix))]
+    return None;
+}
+
+/// Removes the temporary files in a folder that killed writers have left; those of other machines, or from
+/// before this one was started, when they are a day old. Errors are ignored: the files are in nobody's way.
 pub fn sweep(folder: &Path) {
     let Ok(entries) = fs::read_dir(folder) else { return };
     for path in entries.flatten().map(|entry| entry.path()) {
         let name = path.file_name().and_then(|name| name.to_str()).unwrap_or_default();
-        let is_file = || fs::symlink_metadata(&path).is_ok_and(|there| there.is_file());
-        if !(name.starts_with(PREFIX) && name.ends_with(SUFFIX) && is_file()) {
+        let Ok(there) = fs::symlink_metadata(&path) else { continue };
+        let age = || there.modified().ok()?.elapsed().ok();
+        let is_left =
+            || name.starts_with(&*OWN_PREFIX) || age().is_some_and(|age| age > LONGEST_WRITE);
+        if !(name.starts_with(PREFIX) && name.ends_with(SUFFIX) && there.is_file() && is_left()) {
             continue;
         }
         // Locked until it is removed: a writer that comes late sees that it has lost the file.
@@ -109,7 +139,7 @@ pub fn folder_of(path: &Path) -> &Path {
 /// A temporary file in a folder, locked.
 fn temporary_file(folder: &Path) -> io::Result<NamedTempFile> {
     let mut builder = Builder::new();
-    builder.prefix(PREFIX).suffix(SUFFIX);
+    builder.prefix(&*OWN_PREFIX).suffix(SUFFIX);
     // A temporary file is private by default; an output is as open as the user's mask allows.
     #[cfg(unix)]
     builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
@@ -218,16 +248,33 @@ mod tests {
     fn what_dead_writers_left_is_swept_and_what_lives_stays() {
         let folder = tempfile::tempdir().unwrap();
         let path = |name: &str| folder.path().join(name);
-        for name in [".candelabra-dead.part", ".candelabra-x", "a.part", "candelabra-y.part"] {
+        let dead = format!("{}dead.part", *OWN_PREFIX);
+        // Of another machine, whose locks may not be seen here: young, and older than any write.
+        let (young, old) = (".candelabra-0other-a.part", ".candelabra-0other-b.part");
+        for name in [&dead, young, old, ".candelabra-x", "a.part", "candelabra-y.part"] {
             fs::write(path(name), "half").unwrap();
         }
-        fs::create_dir(path(".candelabra-folder.part")).unwrap();
+        let long_ago = std::time::SystemTime::now() - 2 * LONGEST_WRITE;
+        File::options().write(true).open(path(old)).unwrap().set_modified(long_ago).unwrap();
+        fs::create_dir(path(&format!("{}folder.part", *OWN_PREFIX))).unwrap();
         let alive = temporary_file(folder.path()).unwrap();
+        alive.as_file().set_modified(long_ago).unwrap();
         sweep(folder.path());
-        assert!(!path(".candelabra-dead.part").exists());
-        assert!(alive.path().exists());
-        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 5);
+        assert!(!path(&dead).exists() && !path(old).exists());
+        assert!(alive.path().exists() && path(young).exists());
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 6);
         sweep(&path("no such folder"));
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_disk_without_room_is_told_beforehand() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("large");
+        check_room(&path, 1 << 10).unwrap();
+        let error = check_room(&path, u64::MAX).unwrap_err();
+        assert_eq!(error.kind(), io::ErrorKind::StorageFull);
+        assert!(error.to_string().contains("are free"), "{error}");
     }
 
     /// Two writers and a sweeper on one folder: every file is written whole, nothing stays.

@@ -24,36 +24,17 @@ pub struct MappedFile {
     state: io::Result<State>,
 }
 
-/// What changes when a file is written to.
+/// What changes when a file is written to, and not when it gets another name.
 #[derive(PartialEq, Eq)]
 struct State {
     length: u64,
     modified: SystemTime,
-    /// How many names it has, and when it was changed in any way: also by taking a name away.
-    #[cfg(unix)]
-    inode: (u64, i64, i64),
 }
 
 impl State {
     fn of(file: &File) -> io::Result<State> {
         let now = file.metadata()?;
-        #[cfg(unix)]
-        use std::os::unix::fs::MetadataExt;
-        Ok(State {
-            length: now.len(),
-            modified: now.modified()?,
-            #[cfg(unix)]
-            inode: (now.nlink(), now.ctime(), now.ctime_nsec()),
-        })
-    }
-
-    /// Whether nobody has written to the file in between. That it got or lost a name does not matter.
-    fn is_same(&self, other: &State) -> bool {
-        #[cfg(unix)]
-        if self.inode.0 == other.inode.0 {
-            return self == other;
-        }
-        (self.length, self.modified) == (other.length, other.modified)
+        Ok(State { length: now.len(), modified: now.modified()? })
     }
 }
 
@@ -72,10 +53,10 @@ impl MappedFile {
         Ok(MappedFile { map, file, state })
     }
 
-    /// Whether nobody has written to the file since it was mapped, as far as its length and times tell.
+    /// Whether nobody has written to the file since it was mapped, as far as its length and time tell.
     pub fn is_unchanged(&self) -> bool {
         match (&self.state, State::of(&self.file)) {
-            (Ok(then), Ok(now)) => then.is_same(&now),
+            (Ok(then), Ok(now)) => *then == now,
             _ => false,
         }
     }
@@ -87,10 +68,11 @@ impl AsRef<[u8]> for MappedFile {
     }
 }
 
-#[cfg(test)]
+#[cfg(all(test, unix))]
 mod tests {
     use super::*;
     use std::fs;
+    use std::os::unix::fs::PermissionsExt;
 
     #[test]
     fn a_mapped_file_notices_who_writes_to_it_and_not_who_replaces_it() {
@@ -106,6 +88,12 @@ mod tests {
         fs::write(&other, "later").unwrap();
         fs::rename(&other, &path).unwrap();
         assert!(replaced.is_unchanged() && replaced.as_ref() == b"first");
+        // Archived under another name, and made private: nobody wrote to it.
+        let archived = mapped("first");
+        pause();
+        fs::rename(&path, &other).unwrap();
+        fs::set_permissions(&other, fs::Permissions::from_mode(0o600)).unwrap();
+        assert!(archived.is_unchanged());
         // Of the same length; of another.
         for content in ["FIRST", "longer"] {
             let written = mapped("first");

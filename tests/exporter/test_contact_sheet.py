@@ -57,9 +57,12 @@ def test_it_is_as_open_as_the_mask_allows(folder: Path, mask: int, mode: int) ->
 
 
 def test_what_dead_writers_left_is_removed_and_what_lives_stays(folder: Path) -> None:
-    dead, alive = folder / ".candelabra-dead.part", folder / ".candelabra-alive.part"
+    boot = Path("/proc/sys/kernel/random/boot_id").read_text().split("-")[0]
+    dead, alive = (folder / f".candelabra-{boot}-{name}.part" for name in ("dead", "alive"))
+    elsewhere = folder / ".candelabra-0other-a.part"
     dead.write_text("half")
+    elsewhere.write_text("half")
     with alive.open("w") as file:
         fcntl.flock(file, fcntl.LOCK_EX)
         sheet(folder, "0.png")
-        assert alive.exists() and not dead.exists()
+        assert alive.exists() and elsewhere.exists() and not dead.exists()

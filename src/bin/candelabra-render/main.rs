@@ -29,7 +29,7 @@ fn main() -> ExitCode {
     match run(&arguments) {
         Ok(code) => code.into(),
         Err(error) => {
-            eprintln!("candelabra-render: {}", Plain(format_args!("{error:#}")));
+            say(format_args!("{error:#}"));
             ExitCode::from(match error.downcast_ref::<RenderError>() {
                 Some(error) if error.is_bad_tree() => BAD_TREE,
                 Some(error) if error.is_usage() => USAGE,
@@ -59,14 +59,12 @@ fn code_of(report: &RenderReport, stop: &Stop) -> u8 {
     let frames = &report.frames;
     if report.stopped {
         let (done, asked) = (frames.done + frames.up_to_date, frames.asked);
-        eprintln!(
-            "candelabra-render: stopped; {done} of {asked} frames are done; go on with --resume"
-        );
+        say(format_args!("stopped; {done} of {asked} frames are done; go on with --resume"));
         return STOPPED + stop.signal().unwrap_or_default();
     }
     if frames.failed > 0 {
         let plural = if frames.failed == 1 { "" } else { "s" };
-        eprintln!("candelabra-render: {} frame{plural} failed; any others are done", frames.failed);
+        say(format_args!("{} frame{plural} failed; any others are done", frames.failed));
         return FAILED;
     }
     0
@@ -88,4 +86,9 @@ fn peak_memory_bytes() -> Option<u64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
     Some(line.trim().strip_suffix("kB")?.trim().parse::<u64>().ok()? * 1024)
+}
+
+/// Says something on standard error. That nobody listens any more is no reason to panic.
+fn say(what: impl std::fmt::Display) {
+    let _ = writeln!(std::io::stderr(), "candelabra-render: {}", Plain(what));
 }

@@ -182,7 +182,9 @@ impl Shared {
             Event::FrameFailed { frame, why } => format!("frame {frame}: failed: {why}"),
             _ => return,
         };
-        self.bar.suspend(|| eprintln!("{}", Plain(text)));
+        self.bar.suspend(|| {
+            let _ = writeln!(std::io::stderr(), "{}", Plain(text));
+        });
     }
 
     /// Says how far the job is, in a line that no event asks for.

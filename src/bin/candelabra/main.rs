@@ -49,13 +49,23 @@ enum Command {
     Verify(verify::Arguments),
 }
 
+impl Command {
+    /// The exit code if a mapped file is lost. For some, 1 is an answer.
+    fn lost(&self) -> u8 {
+        match self {
+            Command::Diff(_) | Command::Verify(_) => diff::TROUBLE,
+            _ => FAILED,
+        }
+    }
+}
+
 const FAILED: u8 = 1;
 /// Usage; mostly said by clap.
 const USAGE: u8 = 2;
 
 fn main() -> ExitCode {
     let command = Arguments::parse().command;
-    if let Err(error) = lost_pages::explain(i32::from(FAILED)) {
+    if let Err(error) = lost_pages::explain(command.lost().into()) {
         eprintln!("candelabra: {error}");
         return FAILED.into();
     }

@@ -5,9 +5,10 @@
 
 use super::shot::Shot;
 use crate::light_tree::LightTree;
+use crate::pipeline::Watch;
 use crate::render::beauty::Beauty;
 use crate::render::png::exposure_for;
-use crate::render::{RenderDelegate, RenderError, RenderSettings};
+use crate::render::{Progress, RenderDelegate, RenderError, RenderSettings};
 
 /// Rows of the small picture.
 const HEIGHT: u32 = 54;
@@ -17,12 +18,13 @@ const SAMPLES: u32 = 16;
 /// Stops that bring the middle of a frame to middle grey.
 ///
 /// # Errors
-/// If the tree lacks the frame.
+/// If the tree lacks the frame, or the job is stopped.
 pub(super) fn of_frame(
     shot: &Shot,
     delegate: &mut RenderDelegate,
     tree: &LightTree<&[u8]>,
     frame: i32,
+    watch: &dyn Watch,
 ) -> Result<f32, RenderError> {
     let RenderSettings { width, height, .. } = shot.settings;
     let columns = u64::from(width) * u64::from(HEIGHT) / u64::from(height);
@@ -35,7 +37,18 @@ pub(super) fn of_frame(
         crop: None,
         ..shot.settings.clone()
     });
-    let rendered = delegate.render(tree, frame, &());
+    let rendered = delegate.render(tree, frame, &Patience(watch));
     delegate.set_settings(shot.settings.clone());
     Ok(exposure_for(&Beauty::of(&rendered?.buffers, true)))
+}
+
+/// Tells nothing, and hears when to stop.
+struct Patience<'a>(&'a dyn Watch);
+
+impl Progress for Patience<'_> {
+    fn rows_done(&self, _: u64) {}
+
+    fn is_stopped(&self) -> bool {
+        self.0.is_stopped()
+    }
 }

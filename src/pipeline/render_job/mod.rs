@@ -6,7 +6,7 @@
 //!                                                            beside it: encode, write, rename
 //! ```
 //!
-//! What cannot work is found before the first frame is rendered. A frame that fails does not stop the
+//! What cannot work is found before a frame is rendered. A frame that fails does not stop the
 //! others. The picture of a frame depends on the job and on that frame alone, not on which other frames this
 //! process renders, nor on how often it was stopped before.
 
@@ -88,6 +88,12 @@ impl RenderJob {
         }
         tell_stage(watch, "reading the scene");
         let shot = Shot::read(self, watch)?;
+        if watch.is_stopped() {
+            let asked = shot.frames.as_slice().len();
+            let frames = FrameCounts { asked, ..FrameCounts::default() };
+            let seconds = clock.finish();
+            return Ok(RenderReport { frames, seconds, stopped: true, ..RenderReport::default() });
+        }
         if self.frames.is_none() {
             outputs.check(&shot.frames, self.resume)?;
         }

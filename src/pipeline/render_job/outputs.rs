@@ -19,12 +19,9 @@ pub(super) struct Outputs<'a> {
     room: AtomicU64,
 }
 
-/// Free bytes before the length of a picture is known: enough to tell a full disk from another one.
-const LEAST_ROOM: u64 = 64 << 10;
-
 impl<'a> Outputs<'a> {
     pub fn new(names: &'a FrameNames, previews: bool) -> Outputs<'a> {
-        Outputs { names, previews, room: AtomicU64::new(LEAST_ROOM) }
+        Outputs { names, previews, room: AtomicU64::new(0) }
     }
 
     /// The picture of a frame.

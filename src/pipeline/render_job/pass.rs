@@ -151,9 +151,9 @@ impl<'a> Pass<'a> {
         };
         let seconds = self.clock.lap(|seconds| &mut seconds.rendering);
         self.trees.check_unwritten()?;
-        writer.hand_over(Finished { rendered, stamp, seconds, exposure });
+        let is_taken = writer.hand_over(Finished { rendered, stamp, seconds, exposure });
         self.clock.lap(|seconds| &mut seconds.waiting);
-        Ok(Outcome::HandedOver)
+        Ok(if is_taken { Outcome::HandedOver } else { Outcome::Stopped })
     }
 
     /// Stops of previews, if there are any.
@@ -163,7 +163,7 @@ impl<'a> Pass<'a> {
             return Ok(Some(stops));
         }
         self.prepare();
-        let Pass { delegate: Some(delegate), trees, shot, emitters, .. } = self else {
+        let Pass { delegate: Some(delegate), trees, shot, emitters, watch, .. } = self else {
             return Ok(None);
         };
         let frame = frames_of(&shot.scene)[0];
@@ -171,10 +171,10 @@ impl<'a> Pass<'a> {
             // The file may be of other frames; the exposure is the same all the same.
             Err(TreeError::NoSuchFrame { .. }) => {
                 let mut own = ShotTrees::built(&shot.scene, emitters)?;
-                exposure::of_frame(shot, delegate, &own.for_frame(frame)?, frame)?
+                exposure::of_frame(shot, delegate, &own.for_frame(frame)?, frame, *watch)
             }
-            tree => exposure::of_frame(shot, delegate, &tree?, frame)?,
-        };
+            tree => exposure::of_frame(shot, delegate, &tree?, frame, *watch),
+        }?;
         self.clock.lap(|seconds| &mut seconds.exposure);
         self.exposure = Some(stops);
         Ok(self.exposure)
@@ -208,6 +208,7 @@ impl<'a> Pass<'a> {
         if PreviewStamp::of_preview(&preview).as_ref() != Some(&wanted)
             && let Some(stops) = self.exposure()?
         {
+            self.trees.check_unwritten()?;
             write_preview(&preview, &Beauty::read(&picture)?, stops, &wanted)?;
         }
         self.clock.lap(|seconds| &mut seconds.resume);

@@ -57,10 +57,10 @@ impl<'scope> Writer<'scope> {
         Writer { sender, thread: scope.spawn(move || writing.write_all(&receiver)) }
     }
 
-    /// Hands over a frame. Waits until the one before is written.
-    pub fn hand_over(&self, frame: Finished) {
-        // Only a panic ends the thread early; it comes to light when the thread is joined.
-        let _ = self.sender.send(frame);
+    /// Hands over a frame. Waits until the one before is written. Whether it was taken: only a panic ends the
+    /// thread early, which comes to light when it is joined.
+    pub fn hand_over(&self, frame: Finished) -> bool {
+        self.sender.send(frame).is_ok()
     }
 
     /// Waits until everything is written.
@@ -109,8 +109,11 @@ impl Writing<'_> {
         match write_exr(&output, &rendered.buffers, &metadata) {
             Ok(bytes) => self.outputs.note_length(bytes),
             Err(error) => {
-                // As long as it could be: the next frame is not rendered for nothing.
-                self.outputs.note_length(rendered.buffers.byte_length());
+                use io::ErrorKind::{QuotaExceeded, StorageFull};
+                if matches!(error.kind(), StorageFull | QuotaExceeded) {
+                    // As long as it could be: the next frame is not rendered for nothing.
+                    self.outputs.note_length(rendered.buffers.byte_length());
+                }
                 return Err(error);
             }
         }
