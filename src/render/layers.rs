@@ -4,7 +4,7 @@
 //! groups are a layer each, and motion and Cryptomatte are several. `docs/layers.md` is the list for users.
 //!
 //! Names are those that compositing programs know: the main picture is unnamed (OpenEXR's convention),
-//! light groups are `RGBA_<group>` (Arnold), motion is `forward` and `backward` (Nuke), object ids are
+//! light groups are `RGBA_NAME` (Arnold), motion is `forward` and `backward` (Nuke), object ids are
 //! `CryptoObject00` (the Cryptomatte specification).
 
 use clap::ValueEnum;
@@ -22,7 +22,7 @@ pub enum Aov {
     Emission,
     /// indirect.RGB: light scattered more than once
     Indirect,
-    /// RGBA_<group>.RGB: the light of each light group, and RGBA_default of all others
+    /// RGBA_NAME.RGB: the light of each light group, by its name, and RGBA_default of all others
     LightGroups,
     /// Z: metres in front of the camera
     Depth,
