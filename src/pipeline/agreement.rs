@@ -72,6 +72,7 @@ pub(super) fn find_contradiction<D: AsRef<[u8]> + Sync>(
         agreement.of_shared().or_else(|| agreement.of_still()).or_else(frames)
     };
     (agreement.of_lights(&survey.lights))
+        .or_else(|| agreement.of_fingerprints(&survey.frames))
         .or_else(|| agreement.of_textures(&survey.textures))
         .or_else(|| if leaves { agreement.of_number_of_trees().or_else(of_trees) } else { None })
 }
@@ -124,6 +125,13 @@ impl<'a, D: AsRef<[u8]> + Sync> Agreement<'a, D> {
             Some(Contradiction { path: path.clone(), what })
         };
         rows.par_iter().enumerate().find_map_first(differs)
+    }
+
+    /// The fingerprints of frames.
+    fn of_fingerprints(&self, frames: &[SurveyedFrame]) -> Option<Contradiction> {
+        let told = self.tree.frames().iter().map(|row| row.frame).zip(self.tree.fingerprints());
+        let is_so = told.eq(frames.iter().map(|frame| (frame.number, &frame.fingerprint)));
+        (!is_so).then(|| self.in_general("the fingerprints of the frames"))
     }
 
     /// The means of textures.

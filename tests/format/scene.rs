@@ -137,6 +137,15 @@ fn whatever_passes_has_the_scenes_leaves() {
                 let own = leaves(&tree);
                 let same = own.iter().zip(&honest).all(|(a, b)| a.difference(b).is_none());
                 assert!(same && own.len() == honest.len());
+                // What agrees in the whole agrees frame by frame: no build calls it up to date, and no
+                // render stale.
+                let path = "shot.ltree".as_ref();
+                let file = TreeFile { tree: tree.by_reference(), path, forced: &[], verify: true };
+                let trees = ShotTrees::of_file(&owner.scene, &owner.emitters, file);
+                let mut trees = trees.unwrap_or_else(|error| panic!("{error}"));
+                for frame in 1..=3 {
+                    trees.for_frame(frame).map(drop).unwrap();
+                }
             }
             let rebuilt = open(rebuild_tree(&survey, &tree).bytes);
             rebuilt.verify().unwrap();
