@@ -140,7 +140,13 @@ fn whatever_passes_has_the_scenes_leaves() {
                 // What agrees in the whole agrees frame by frame: no build calls it up to date, and no
                 // render stale.
                 let path = "shot.ltree".as_ref();
-                let file = TreeFile { tree: tree.by_reference(), path, forced: &[], verify: true };
+                let file = TreeFile {
+                    tree: tree.by_reference(),
+                    path,
+                    forced: &[],
+                    verify: true,
+                    mapped: None,
+                };
                 let trees = ShotTrees::of_file(&owner.scene, &owner.emitters, file);
                 let mut trees = trees.unwrap_or_else(|error| panic!("{error}"));
                 for frame in 1..=3 {
