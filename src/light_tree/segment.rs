@@ -180,7 +180,9 @@ mod tests {
             let seen = (0..=2000).map(|i| cosine(length * f64::from(i) / 2000.0));
             let seen = seen.fold(-1.0, f64::max);
             prop_assert!(seen <= largest + 1e-12, "{seen} {largest}");
-            prop_assert!(seen >= largest - 2e-2 || segment.passage(center).nearest2 < 1e-3);
+            // What is closer than some steps is passed too fast to be seen.
+            let close2 = (2.5 * length / 2000.0).powi(2);
+            prop_assert!(seen >= largest - 2e-2 || segment.passage(center).nearest2 < close2);
         }
 
         /// A point light's importance is the integral over the segment of `I / d^2`.

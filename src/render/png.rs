@@ -8,7 +8,7 @@
 use super::beauty::Beauty;
 use crate::math::color::{Rgb, linear_to_srgb, luminance};
 use crate::store::{read_regular, write_atomically};
-use png::{BitDepth, ColorType, Decoder, Encoder};
+use png::{BitDepth, ColorType, Decoder, Encoder, EncodingError};
 use std::io::{self, Cursor};
 use std::path::Path;
 
@@ -29,11 +29,19 @@ pub fn write_png(path: &Path, picture: &Beauty, exposure_stops: f32, text: &str)
         let mut encoder = Encoder::new(file, picture.width, picture.height);
         encoder.set_color(ColorType::Rgb);
         encoder.set_depth(BitDepth::Eight);
-        encoder.add_text_chunk(KEYWORD.into(), text.into()).map_err(io::Error::other)?;
-        let mut writer = encoder.write_header().map_err(io::Error::other)?;
-        writer.write_image_data(&pixels).map_err(io::Error::other)?;
-        writer.finish().map_err(io::Error::other)
+        encoder.add_text_chunk(KEYWORD.into(), text.into()).map_err(into_io)?;
+        let mut writer = encoder.write_header().map_err(into_io)?;
+        writer.write_image_data(&pixels).map_err(into_io)?;
+        writer.finish().map_err(into_io)
     })
+}
+
+/// Keeps the kind of an error: a full disk has a remedy.
+fn into_io(error: EncodingError) -> io::Error {
+    match error {
+        EncodingError::IoError(error) => error,
+        other => io::Error::other(other),
+    }
 }
 
 /// The text of a preview that [`write_png`] made, if the file is whole: PNG has a checksum for every chunk.

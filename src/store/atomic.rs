@@ -33,7 +33,7 @@ static OWN_PREFIX: LazyLock<String> = LazyLock::new(|| {
 /// No writer works on one file for longer.
 const LONGEST_WRITE: Duration = Duration::from_secs(24 * 3600);
 /// What is written to find out whether anything can be.
-const TRIAL_BYTES: u64 = 64 << 10;
+const TRIAL: [u8; 1 << 12] = [0x5a; 1 << 12];
 
 /// Writes a file through `write`, all or nothing. Parent folders are created.
 ///
@@ -44,15 +44,20 @@ pub fn write_atomically(
     write: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>,
 ) -> io::Result<()> {
     replace(path, write).map_err(|error| {
-        use io::ErrorKind::{FileTooLarge, QuotaExceeded, StorageFull};
-        let remedy = match error.kind() {
-            StorageFull | QuotaExceeded | FileTooLarge => {
+        let remedy = match is_full(&error) {
+            true => {
                 "; the old file, if any, is as it was: free some space, or choose another output"
             }
-            _ => "",
+            false => "",
         };
         io::Error::new(error.kind(), format!("{}: {error}{remedy}", path.display()))
     })
+}
+
+/// Whether there is no room on a disk, or none that this user may take.
+pub fn is_full(error: &io::Error) -> bool {
+    use io::ErrorKind::{FileTooLarge, QuotaExceeded, StorageFull};
+    matches!(error.kind(), StorageFull | QuotaExceeded | FileTooLarge)
 }
 
 /// Checks that a small file can be written; see [`check_room`].
@@ -65,8 +70,11 @@ pub fn check_writable(path: &Path) -> io::Result<()> {
 /// file system has room for the bytes. Nothing is left behind. Errors name the path and the remedy.
 pub fn check_room(path: &Path, bytes: u64) -> io::Result<()> {
     check(path, bytes).map_err(|error| {
-        let problem =
-            format!("{}: cannot be written: {error}; choose another output", path.display());
+        let remedy = if is_full(&error) { "free some space, or " } else { "" };
+        let problem = format!(
+            "{}: cannot be written: {error}; {remedy}choose another output",
+            path.display()
+        );
         io::Error::new(error.kind(), problem)
     })
 }
@@ -87,7 +95,7 @@ fn check(path: &Path, bytes: u64) -> io::Result<()> {
         folder = folder_of(folder);
     }
     let mut temporary = temporary_file(folder)?;
-    temporary.write_all(&[0x5a; TRIAL_BYTES as usize])?;
+    temporary.write_all(&TRIAL)?;
     temporary.flush()?;
     match room(temporary.as_file()) {
         Some(room) if room < bytes => {

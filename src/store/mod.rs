@@ -15,7 +15,7 @@ mod regular;
 mod rule;
 mod seal;
 
-pub use atomic::{check_room, check_writable, folder_of, sweep, write_atomically};
+pub use atomic::{check_room, check_writable, folder_of, is_full, sweep, write_atomically};
 pub use bytes::{ALIGNMENT, AlignedBytes};
 pub use container::{Container, ContainerWriter, MAGIC, Section, SectionId, VERSION};
 pub use error::{RULES_OF_HEADER, RULES_OF_TABLE, StoreError};

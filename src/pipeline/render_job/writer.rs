@@ -9,6 +9,7 @@ use crate::render::beauty::Beauty;
 use crate::render::exr::write_exr;
 use crate::render::path::TraceStats;
 use crate::render::png::write_png;
+use crate::store::is_full;
 use std::io;
 use std::path::Path;
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
@@ -109,8 +110,7 @@ impl Writing<'_> {
         match write_exr(&output, &rendered.buffers, &metadata) {
             Ok(bytes) => self.outputs.note_length(bytes),
             Err(error) => {
-                use io::ErrorKind::{QuotaExceeded, StorageFull};
-                if matches!(error.kind(), StorageFull | QuotaExceeded) {
+                if is_full(&error) {
                     // As long as it could be: the next frame is not rendered for nothing.
                     self.outputs.note_length(rendered.buffers.byte_length());
                 }
