@@ -27,7 +27,8 @@ pub struct RunOptions {
     pub root: PathBuf,
     /// The folder of the logs; each job has a folder in there.
     pub logs: PathBuf,
-    /// How often a task that fails is tried again.
+    /// How often a task that fails is tried again, but for one that ends with 2 or 3: usage, or a tree to be
+    /// built again.
     pub retries: u32,
 }
 
@@ -107,6 +108,13 @@ pub enum Fault {
     Silence(u64),
     /// It could not be started, or its log not be written.
     System(String),
+}
+
+impl Fault {
+    /// Whether another attempt would end alike: usage errors (2), and trees that are stale or broken (3).
+    fn is_final(&self) -> bool {
+        matches!(self, Fault::Code(2 | 3))
+    }
 }
 
 impl fmt::Display for Fault {
@@ -204,7 +212,7 @@ fn attempt(
                 *stopped = signal;
                 return Outcome::Stopped;
             }
-            Some(fault) if attempt > options.retries => return Outcome::Failed(fault),
+            Some(fault) if attempt > options.retries || fault.is_final() => return Outcome::Failed(fault),
             Some(fault) => watch.tell(RunEvent::Again { task, fault: &fault }),
         }
     }
