@@ -99,7 +99,7 @@ def digest_of(sheet: Path) -> str | None:
         with Image.open(sheet) as picture:
             picture.load()
             return picture.info.get(KEYWORD)
-    except OSError:
+    except (OSError, SyntaxError, ValueError):
         return None
 
 

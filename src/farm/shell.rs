@@ -94,6 +94,9 @@ mod tests {
         let told = String::from_utf8(output.stdout).unwrap();
         let (command, printed) = told.split_once('\n').unwrap();
         assert_eq!(command, format!("{}: {}", task.name, task.command));
-        assert_eq!(printed, task.command.strip_prefix("printf %s '").unwrap().trim_end_matches('\''));
+        assert_eq!(
+            printed,
+            task.command.strip_prefix("printf %s '").unwrap().trim_end_matches('\'')
+        );
     }
 }

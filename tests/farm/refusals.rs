@@ -166,7 +166,7 @@ fn a_message_is_short_and_has_its_remedy_however_long_the_fault() {
     let long = "é".repeat(1 << 20);
     for (old, remedy) in [
         ("testing", "alone"),
-        ("sh010", "take three or more letters"),
+        ("sh010", "digits, _ - and . alone"),
         ("<chunk>4", "write a whole number"),
         ("1-10<", "write 1001-1048"),
         ("name=\"two", "take three or more letters"),
@@ -174,7 +174,11 @@ fn a_message_is_short_and_has_its_remedy_however_long_the_fault() {
     ] {
         let good = text();
         assert!(good.contains(old), "{old}");
-        let new = format!("{}{long}{}", old.trim_end_matches('<'), &old[old.trim_end_matches('<').len()..]);
+        let new = format!(
+            "{}{long}{}",
+            old.trim_end_matches('<'),
+            &old[old.trim_end_matches('<').len()..]
+        );
         let message = refusal(&good.replacen(old, &new, 1));
         assert!(message.len() < 2500 && message.contains(remedy), "{old}: {message:.3000}");
     }

@@ -3,7 +3,8 @@
 //! A command is run by `sh -c` with OpenCue's environment, as RQD does, in the job's root. It has a process
 //! group of its own; when the command ends, what it has left running in there is killed. All that it prints
 //! goes to the log of its task, `LOGS/JOB/1001-render.rqlog`; lines that are [`Event`]s are told to the
-//! [`RunWatch`] and logged in words. Commands use all cores themselves, so two at a time would gain nothing.
+//! [`RunWatch`] and logged in words. Commands use all cores themselves, so two at a time would gain nothing,
+//! and `CUE_THREADS` is the machine's cores, whatever a layer reserves on a farm.
 //!
 //! A task that fails does not stop those that do not wait for it. A signal is passed on to the command, and
 //! what it makes of that is awaited; a second one kills it. The clock is read for timeouts alone.
@@ -11,11 +12,11 @@
 mod command;
 mod log;
 
-use super::job::DependKind;
+use super::job::{DependKind, JobError};
 use super::plan::{Plan, Task};
 use crate::pipeline::Event;
 use command::Ending;
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
 use std::fmt;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -147,6 +148,22 @@ impl Summary {
     }
 }
 
+/// Checks that each job has a folder of its own for its logs.
+///
+/// # Errors
+/// [`JobError::SameName`], of the first that has not.
+pub fn check_logs(runs: &[(Plan, RunOptions)]) -> Result<(), JobError> {
+    let mut folders = HashMap::new();
+    for (plan, options) in runs {
+        let (name, path) = (&plan.job.name, &plan.job.path);
+        if let Some(other) = folders.insert(options.logs.join(name), path) {
+            let (name, path, other) = (name.clone(), path.clone(), other.clone());
+            return Err(JobError::SameName { name, path, other });
+        }
+    }
+    Ok(())
+}
+
 /// The log of a task.
 pub fn log_path(options: &RunOptions, plan: &Plan, task: &Task) -> PathBuf {
     options.logs.join(&plan.job.name).join(format!("{}.rqlog", task.name))
@@ -212,7 +229,9 @@ fn attempt(
                 *stopped = signal;
                 return Outcome::Stopped;
             }
-            Some(fault) if attempt > options.retries || fault.is_final() => return Outcome::Failed(fault),
+            Some(fault) if attempt > options.retries || fault.is_final() => {
+                return Outcome::Failed(fault);
+            }
             Some(fault) => watch.tell(RunEvent::Again { task, fault: &fault }),
         }
     }
