@@ -14,6 +14,7 @@ from pathlib import Path
 
 from pxr import Tf, UsdUtils
 
+from .events import tell_up_to_date
 from .export import export
 from .whole_file import write_atomically
 from .report import CATEGORIES, ExportError
@@ -125,7 +126,7 @@ def _run(arguments: argparse.Namespace) -> int:
     diagnostics = UsdUtils.CoalescingDiagnosticDelegate()
     recorded = recorded_hash(output)
     if recorded is not None and _is_current(report_path, recorded, source, options, arguments.strict):
-        print(f"{output}: up to date")
+        tell_up_to_date(output)
         return 0
 
     exported = export(source, output, options)

@@ -57,7 +57,7 @@ class Report:
             "warnings": in_order(self.warnings),
             "notes": in_order(self.notes),
             "counts": dict(sorted(self.counts.items())),
-            "dependencies": dependencies,
+            "dependencies": dict(sorted(dependencies.items())),
         }
         return json.dumps(body, indent=1, ensure_ascii=False) + "\n"
 

@@ -30,13 +30,14 @@ _ENVIRONMENT = ("PXR_AR_DEFAULT_SEARCH_PATH", "PXR_PLUGINPATH_NAME")
 
 
 class Dependencies:
-    """The files that one export reads, by their path relative to the source's folder."""
+    """The files that one export reads, by their path relative to the source's folder. Links are not
+    followed in these paths: the next run has to go through them again, since they may lead elsewhere then."""
 
     def __init__(self, source: Path) -> None:
         self.started = time.time_ns()
-        self.folder = os.path.realpath(source.parent)
+        self.folder = os.path.abspath(source.parent)
         self.files: dict[str, str] = {}
-        self._add_layer(os.path.realpath(source))
+        self._add_layer(os.path.abspath(source))
 
     def read(self, resolved: str) -> bytes | None:
         """The bytes of a resolved asset (also one inside a .usdz), or None if there is none."""
@@ -90,9 +91,9 @@ def up_to_date(source: Path, options: Options, fingerprint: str, dependencies: d
     """Whether the files of an earlier export still have the content that `fingerprint` stands for."""
     if not all(isinstance(digest, str) for digest in dependencies.values()):
         return False
-    folder = os.path.realpath(source.parent)
+    folder = os.path.abspath(source.parent)
     # The list must be of this source: a report may have been copied from elsewhere.
-    if os.path.relpath(os.path.realpath(source), folder) not in dependencies or CHANGED in dependencies.values():
+    if os.path.basename(os.path.abspath(source)) not in dependencies or CHANGED in dependencies.values():
         return False
     files = {}
     for name in dependencies:

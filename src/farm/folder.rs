@@ -1,18 +1,16 @@
 //! All jobs of a folder.
 
 use super::job::{Job, JobError};
-use std::collections::HashMap;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use walkdir::{DirEntry, WalkDir};
 
 /// Reads a job file; or all of a folder and the folders in it, `*.xml` in the order of their paths, but
 /// for hidden ones.
 ///
 /// # Errors
-/// All files that are refused, and jobs of one name whose logs would be mixed up. The list is never empty.
+/// All files that are refused. The list is never empty.
 pub fn read_jobs(path: &Path) -> Result<Vec<Job>, Vec<JobError>> {
     let (mut jobs, mut errors) = (Vec::new(), Vec::new());
-    let mut names: HashMap<(PathBuf, String), PathBuf> = HashMap::new();
     let is_seen = |entry: &DirEntry| {
         entry.depth() == 0 || !entry.file_name().as_encoded_bytes().starts_with(b".")
     };
@@ -31,15 +29,7 @@ pub fn read_jobs(path: &Path) -> Result<Vec<Job>, Vec<JobError>> {
             continue;
         }
         match Job::read(entry.path()) {
-            Ok(job) => {
-                let key = (job.root.clone(), job.name.clone());
-                match names.insert(key, job.path.clone()) {
-                    None => jobs.push(job),
-                    Some(other) => {
-                        errors.push(JobError::SameName { name: job.name, path: job.path, other })
-                    }
-                }
-            }
+            Ok(job) => jobs.push(job),
             Err(error) => errors.push(error),
         }
     }

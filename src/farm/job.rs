@@ -111,8 +111,8 @@ pub enum JobError {
         /// What is wrong, and where.
         refusal: Refusal,
     },
-    /// Another job of the same folder has its name, so their logs would be mixed up.
-    #[error("{}: its job is called {name} as that of {} is; rename one", path.display(), other.display())]
+    /// Another job has its name and its folder of logs, which would be mixed up.
+    #[error("{}: its job is called {name} as that of {} is, and both would log to one folder; rename one", path.display(), other.display())]
     SameName {
         /// The file.
         path: PathBuf,

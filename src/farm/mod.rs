@@ -33,5 +33,5 @@ pub use job::{Depend, DependKind, Job, JobError, Layer, LayerKind};
 pub use opencue::{OpenCueError, opencue};
 pub use openjd::openjd;
 pub use plan::{Plan, PlanError, PlannedLayer, Selection, Task};
-pub use run::{Fault, Outcome, RunEvent, RunOptions, RunWatch, Summary, log_path, run};
+pub use run::{Fault, Outcome, RunEvent, RunOptions, RunWatch, Summary, check_logs, log_path, run};
 pub use slurm::slurm;

@@ -10,6 +10,11 @@ use super::plan::{Plan, PlannedLayer};
 use super::shell;
 use serde_json::{Value, json};
 
+/// Our programs tell the session how far they are.
+const PROGRESS: (&str, &str) = ("CANDELABRA_PROGRESS", "openjd");
+/// From SIGTERM to SIGKILL, as long as Slurm leaves. Without a notice OpenJD kills at once.
+const NOTICE_SECONDS: u64 = 30;
+
 /// The template of a plan whose commands run in `root`.
 pub fn openjd(plan: &Plan, root: &str) -> Value {
     let steps: Vec<_> = plan.layers.iter().map(|layer| step(plan, layer, root)).collect();
@@ -28,9 +33,16 @@ fn step(plan: &Plan, planned: &PlannedLayer, root: &str) -> Value {
     // OpenJD's chunks are OpenCue's but for the sign of a step and a single frame, `7-7`.
     let script = format!(
         "frames=$(printf %s '{{{{Task.Param.Frame}}}}' | sed 's/:/x/g; s/^\\(-*[0-9]*\\)-\\1$/\\1/')\n{}",
-        without_braces(&shell::chunk(plan, planned, root))
+        without_braces(&shell::chunk(plan, planned, root, PROGRESS))
     );
-    let mut run = json!({"command": "sh", "args": ["{{Task.File.Run}}"]});
+    let mut run = json!({
+        "command": "sh",
+        "args": ["{{Task.File.Run}}"],
+        "cancelation": {
+            "mode": "NOTIFY_THEN_TERMINATE",
+            "notifyPeriodInSeconds": NOTICE_SECONDS,
+        },
+    });
     if let Some(minutes) = planned.layer.timeout_minutes {
         run["timeout"] = json!(minutes * 60);
     }

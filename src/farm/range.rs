@@ -102,11 +102,11 @@ fn expand(part: &str) -> Result<Vec<i32>, RangeError> {
     let (Step::By(size) | Step::AllBut(size) | Step::Interleaved(size)) = step;
     // As in OpenCue, one frame has no descending step.
     if size.signum() != default {
-        return Err(RangeError::Step(part.into()));
+        return Err(RangeError::Step(shortened(part)));
     }
     let taken = if matches!(step, Step::By(_)) { size } else { default };
     if ((last - first) / taken) as usize >= MOST_FRAMES {
-        return Err(RangeError::TooMany(part.into()));
+        return Err(RangeError::TooMany(shortened(part)));
     }
     let by = |first: i64, size: i64| {
         let count = if (last - first) * size < 0 { 0 } else { (last - first) / size + 1 };
@@ -187,6 +187,21 @@ mod tests {
         let again = vec!["1-100000"; 1000].join(",");
         for text in ["0-100000", "-2147483648-2147483647", "1-200000y2", "1-200000:2", &again] {
             assert!(matches!(parse(text), Err(RangeError::TooMany(_))), "{text}");
+        }
+    }
+
+    #[test]
+    fn a_message_is_short_whatever_was_written() {
+        let zeros = "0".repeat(1 << 20);
+        for text in [
+            format!("a{zeros}"),
+            format!("1-5x{zeros}"),
+            format!("1-{zeros}500000"),
+            format!("1-9y{zeros}1"),
+            format!("1-5:{zeros}"),
+        ] {
+            let message = parse(&text).unwrap_err().to_string();
+            assert!(message.len() < 200, "{} bytes", message.len());
         }
     }
 

@@ -26,7 +26,7 @@ pub fn slurm(plan: &Plan, root: &str, logs: &str) -> String {
     );
     for (place, planned) in plan.layers.iter().enumerate() {
         let chunks: Vec<String> = planned.chunks().map(range::format).collect();
-        let run = shell::chunk(plan, planned, root);
+        let run = shell::chunk(plan, planned, root, ("CUE_LOG_PATH", &logs));
         let _ = write!(script, "\n# {}\nids_{place}=\n", planned.layer.name);
         for (array, chunks) in chunks.chunks(ARRAY).enumerate() {
             submit(&mut script, plan, place, array, chunks, &run, &logs);

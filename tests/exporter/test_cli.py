@@ -73,6 +73,60 @@ def test_same_input_same_bytes(export, tmp_path):
     assert (tmp_path / "b.glb").read_bytes() == first
 
 
+def test_the_report_is_the_same_in_every_process(export, tmp_path):
+    names = [f"part{number}.usda" for number in range(12)]
+    for name in names:
+        (tmp_path / name).write_text('#usda 1.0\ndef SphereLight "L" {}\n')
+    parts = "\n".join(f'def "P{n}" (references = @{name}@</L>) {{}}' for n, name in enumerate(names))
+    export(parts)
+    reports = set()
+    for seed in range(4):
+        command = [sys.executable, str(ROOT / "scripts" / "usd_to_gltf.py"), "scene.usda", "a.glb"]
+        environment = {**os.environ, "PYTHONHASHSEED": str(seed)}
+        subprocess.run(command, check=True, capture_output=True, env=environment, cwd=tmp_path)
+        reports.add((tmp_path / "a.glb.report.json").read_text())
+        (tmp_path / "a.glb").unlink()
+    assert len(reports) == 1
+    dependencies = list(json.loads(reports.pop())["dependencies"])
+    assert dependencies == sorted([*names, "scene.usda"])
+
+
+def test_it_matters_not_by_which_path_a_scene_is_reached(tmp_path):
+    real = tmp_path / "real"
+    (real / "sub").mkdir(parents=True)
+    (real / "scene.usda").write_text('#usda 1.0\ndef "A" (references = @sub/current.usda@</B>) {}\n')
+    for version in "12":
+        lamp = f'#usda 1.0\ndef SphereLight "B" {{\n float inputs:intensity = {version}\n}}\n'
+        (real / "sub" / f"v{version}.usda").write_text(lamp)
+    (real / "sub" / "current.usda").symlink_to("v1.usda")
+    (tmp_path / "link").symlink_to("real")
+
+    def exported(source, output, folder=tmp_path):
+        command = [sys.executable, str(ROOT / "scripts" / "usd_to_gltf.py"), str(source), str(output)]
+        done = subprocess.run(command, check=True, capture_output=True, text=True, cwd=folder)
+        return done.stdout
+
+    sources = [real / "scene.usda", tmp_path / "link" / "scene.usda", "real/scene.usda", "link/../link/scene.usda"]
+    for number, source in enumerate(sources):
+        assert "written" in exported(source, tmp_path / f"{number}.glb")
+    assert "written" in exported("scene.usda", tmp_path / "4.glb", tmp_path / "link")
+    assert len({(tmp_path / f"{number}.glb").read_bytes() for number in range(5)}) == 1
+    for source in sources:
+        assert "up to date" in exported(source, tmp_path / "0.glb")
+    # A link that leads elsewhere is another scene.
+    (real / "sub" / "current.usda").unlink()
+    (real / "sub" / "current.usda").symlink_to("v2.usda")
+    assert "written" in exported(sources[1], tmp_path / "0.glb")
+
+
+def test_what_is_up_to_date_is_told_as_candelabra_run_hears_it(export, monkeypatch):
+    path = export(LAMP).path
+    monkeypatch.setenv("CANDELABRA_PROGRESS", "json")
+    assert export(LAMP).out == f'{{"event":"up-to-date","frame":null,"output":"{path}"}}\n'
+    monkeypatch.setenv("CANDELABRA_PROGRESS", "openjd")
+    assert export(LAMP).out == f"{path}: up to date\n"
+
+
 def test_strict_writes_the_report_and_nothing_else(export):
     text = LAMP + '\ndef PluginLight "P" {}'
     result = export(text, "--strict")

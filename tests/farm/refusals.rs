@@ -162,6 +162,29 @@ fn each_fault_is_named_with_its_place_and_remedy() {
 }
 
 #[test]
+fn a_message_is_short_and_has_its_remedy_however_long_the_fault() {
+    let long = "é".repeat(1 << 20);
+    for (old, remedy) in [
+        ("testing", "alone"),
+        ("sh010", "digits, _ - and . alone"),
+        ("<chunk>4", "write a whole number"),
+        ("1-10<", "write 1001-1048"),
+        ("name=\"two", "take three or more letters"),
+        ("<deplayer>two", "take three or more letters"),
+    ] {
+        let good = text();
+        assert!(good.contains(old), "{old}");
+        let new = format!(
+            "{}{long}{}",
+            old.trim_end_matches('<'),
+            &old[old.trim_end_matches('<').len()..]
+        );
+        let message = refusal(&good.replacen(old, &new, 1));
+        assert!(message.len() < 2500 && message.contains(remedy), "{old}: {message:.3000}");
+    }
+}
+
+#[test]
 fn a_ring_is_refused_at_one_of_its_dependences() {
     let layers = ["one", "two", "three"].map(|name| (name, "true", "1", 1));
     let message = refusal(&job(

@@ -35,7 +35,7 @@ fn a_dry_run_prints_what_a_run_runs() {
 #[test]
 fn tokens_and_environment_are_those_of_opencue() {
     let command = "echo #ZFRAME# #IFRAME# #FRAME_START# #FRAME_END# #FRAME_CHUNK# #FRAMESPEC# #FRAME# #LAYER# #JOB#; \
-                   echo $CUE_FRAME $CUE_IFRAME $CUE_LAYER $CUE_JOB $CUE_RANGE $CUE_CHUNK $CUE_SHOW $CUE_SHOT $MINE";
+                   echo $CUE_FRAME $CUE_IFRAME $CUE_LAYER $CUE_JOB $CUE_RANGE $CUE_CHUNK $CUE_SHOW $CUE_SHOT $CUE_THREADS $MINE";
     let text = job(&[("paint", command, "7-11x2,20", 3)], &[]);
     let env = "<chunk>3</chunk><cores>3.5</cores><env><key name=\"MINE\">it's</key></env>";
     let folder = Folder::with(&text.replace("<chunk>3</chunk>", env));
@@ -43,8 +43,12 @@ fn tokens_and_environment_are_those_of_opencue() {
     let log = folder.read("out/logs/tested/0007-paint.rqlog");
     let said: Vec<_> = log.lines().filter(|line| !line.starts_with('#')).collect();
     let tokens = "0007 7 7 11 3 7-11x2 0007-paint paint testing-sh010-jane_tested";
-    let environment = "0007-paint 7 paint testing-sh010-jane_tested 7-11x2,20 3 testing sh010 it's";
-    assert_eq!(said, [tokens, environment]);
+    // A task has the machine for itself, whatever it reserves on a farm.
+    let threads = std::thread::available_parallelism().unwrap();
+    let environment = format!(
+        "0007-paint 7 paint testing-sh010-jane_tested 7-11x2,20 3 testing sh010 {threads} it's"
+    );
+    assert_eq!(said, [tokens, &environment]);
     assert!(
         folder.read("out/logs/tested/0020-paint.rqlog").contains("\n0020 20 20 20 3 20 0020-paint")
     );
@@ -68,6 +72,59 @@ fn commands_run_beside_the_pipelines() {
     std::fs::create_dir(&elsewhere).unwrap();
     folder.ends(&format!("run shots/b/x.xml --root {}", elsewhere.display()), 0);
     assert!(elsewhere.join("here").exists());
+}
+
+#[test]
+fn jobs_whose_logs_would_be_mixed_up_are_refused() {
+    let text = job(&[("where", &trace("x"), "1", 1)], &[]);
+    let folder = Folder::with(&text);
+    folder.write("other/tested.xml", &text);
+    let logs = folder.path("logs");
+    for options in ["--root other", &format!("--logs {}", logs.display()), "--root . --dry-run"] {
+        let told = folder.ends(&format!("run . {options}"), 2);
+        assert!(told.err.contains("tested.xml: its job is called tested as that of"), "{told:#?}");
+    }
+    assert!(!folder.path("trace").exists() && !folder.path("other/trace").exists());
+    folder.ends("run .", 0);
+    folder.write("copy.xml", &text);
+    folder.ends("run .", 2);
+}
+
+#[test]
+fn a_run_in_a_run_is_understood() {
+    let inner = job(&[("inner", "true", "1-4", 1)], &[]);
+    let command = format!("{} run inner/tested.xml", env!("CARGO_BIN_EXE_candelabra"));
+    let folder = Folder::with(&job(&[("outer", &command, "1", 1)], &[]));
+    folder.write("inner/tested.xml", &inner);
+    let told = folder.ends("run tested.xml --progress json", 0);
+    assert!(
+        told.out.contains(r#""told":{"done":0.75,"event":"progress","frame":null}"#),
+        "{told:#?}"
+    );
+    // Who wants another form says so, or has it in the environment.
+    let mut command = folder.command("run inner/tested.xml");
+    let output = command.env("CANDELABRA_PROGRESS", "alfred").output().unwrap();
+    assert!(
+        String::from_utf8(output.stdout)
+            .unwrap()
+            .ends_with("ALF_PROGRESS 75%\nALF_PROGRESS 100%\n")
+    );
+}
+
+#[test]
+fn a_reader_of_errors_that_has_gone_ends_nothing() {
+    let folder =
+        Folder::with(&job(&[("bad", "false", "1", 1), ("after", &trace("after"), "1", 1)], &[]));
+    let code = |arguments: &str| {
+        let (reader, writer) = std::io::pipe().unwrap();
+        drop(reader);
+        folder.command(arguments).stderr(writer).output().unwrap().status.code()
+    };
+    assert_eq!(code("run tested.xml --retries 1"), Some(1));
+    assert_eq!(folder.read("trace"), "after 1\n");
+    assert_eq!(code("run nothing.xml"), Some(2));
+    assert_eq!(code("build nothing.glb"), Some(1));
+    assert_eq!(code("verify nothing.ltree"), Some(2));
 }
 
 #[test]
@@ -130,6 +187,16 @@ fn a_task_that_fails_is_tried_again() {
 }
 
 #[test]
+fn what_would_fail_alike_is_not_tried_again() {
+    for (code, tries) in [(1, 3), (2, 1), (3, 1), (4, 3)] {
+        let command = format!("echo x >> tries; exit {code}");
+        let folder = Folder::with(&job(&[("fails", &command, "1", 1)], &[]));
+        let told = folder.ends("run tested.xml --retries 2", 1);
+        assert_eq!(folder.read("tries").lines().count(), tries, "{told:#?}");
+    }
+}
+
+#[test]
 fn parts_of_a_job_are_chosen_by_layer_and_frame() {
     let [a, b, c] = ["a", "b", "c"].map(trace);
     let folder = Folder::with(&job(
@@ -158,7 +225,10 @@ fn events_are_read_and_told_and_what_is_no_event_is_logged() {
     for line in told.out.lines() {
         let value: serde_json::Value = serde_json::from_str(line).unwrap();
         let event = value["event"].as_str().unwrap();
-        assert!(event.starts_with("task-") || event == "job-started", "{line}");
+        assert!(
+            event.starts_with("task-") || ["job-started", "progress"].contains(&event),
+            "{line}"
+        );
     }
     assert!(told.out.contains(r#""outcome":"up-to-date""#), "{told:#?}");
     assert!(
@@ -196,7 +266,16 @@ fn a_process_that_has_left_its_group_and_prints_for_ever_does_not_keep_the_run()
 fn logs_that_cannot_be_written_stop_the_run_before_it_begins() {
     let folder = Folder::with(&job(&[("only", &trace("x"), "1", 1)], &[]));
     folder.write("out/logs", "in the way");
+    folder.write("next/tested.xml", &job(&[("next", &trace("next"), "1", 1)], &[]));
     let told = folder.ends("run tested.xml", 1);
     assert!(told.err.contains("out/logs/tested"), "{told:#?}");
     assert!(!folder.path("trace").exists());
+    // Other jobs go on.
+    std::fs::rename(folder.path("next"), folder.path("z")).unwrap();
+    let told = folder.ends("run .", 1);
+    assert!(
+        told.err.contains("tested: not begun: ") && told.err.contains("out/logs/tested"),
+        "{told:#?}"
+    );
+    assert_eq!(folder.read("z/trace"), "next 1\n");
 }

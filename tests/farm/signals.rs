@@ -15,7 +15,10 @@ fn wait_for(path: &Path) {
 
 /// Starts the job, sends signals once it is under way, and returns what was said.
 fn stopped_by(folder: &Folder, signals: &[&str]) -> Told {
-    let mut command = folder.command("run tested.xml");
+    stop(folder.command("run tested.xml"), folder, signals)
+}
+
+fn stop(mut command: Command, folder: &Folder, signals: &[&str]) -> Told {
     let child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
     wait_for(&folder.path("started"));
     for signal in signals {
@@ -60,6 +63,53 @@ fn a_command_that_ends_well_in_spite_of_a_signal_has_done_its_work() {
         told.err.contains("1 of 2 tasks done") && told.err.contains("--layer next"),
         "{told:#?}"
     );
+}
+
+#[test]
+fn a_run_under_nohup_outlives_its_terminal() {
+    let folder = Folder::with(&job(
+        &[("long", "touch started; sleep 1", "1", 1), ("next", "touch next", "1", 1)],
+        &[],
+    ));
+    let mut command = Command::new("sh");
+    let ignoring = format!("trap '' HUP; exec {} run tested.xml", env!("CARGO_BIN_EXE_candelabra"));
+    command.current_dir(folder.0.path()).args(["-c", &ignoring]);
+    let told = stop(command, &folder, &["-HUP"]);
+    assert_eq!(told.code, Some(0), "{told:#?}");
+    assert!(folder.path("next").exists());
+}
+
+#[test]
+fn a_folder_that_is_stopped_tells_what_was_not_begun_and_goes_on_as_a_whole() {
+    let text = |name: &str, command: &str| {
+        job(&[("only", command, "1-2", 1)], &[]).replace("tested", name)
+    };
+    let folder = Folder::with("");
+    std::fs::remove_file(folder.path("tested.xml")).unwrap();
+    let long = "echo b >> trace; touch ../started; test -e go || while :; do sleep 0.05; done";
+    for (name, command) in [
+        ("job_a", "echo a >> trace"),
+        ("job_b", long),
+        ("job_c", "echo c >> trace"),
+        ("job_d", "true"),
+    ] {
+        folder.write(&format!("shots/{name}.xml"), &text(name, command));
+    }
+    let told = stop(folder.command("run shots --frames 1 --progress none"), &folder, &["-TERM"]);
+    assert_eq!(told.code, Some(143), "{told:#?}");
+    let (job_b, rest) = told.err.split_once("  job_c not begun: the run was stopped\n").unwrap();
+    assert!(
+        job_b.contains("go on with: candelabra run shots/job_b.xml --layer only --frames 1\n"),
+        "{job_b}"
+    );
+    let again = "candelabra run shots --frames 1";
+    assert_eq!(
+        rest,
+        format!("  job_d not begun: the run was stopped\ngo on with all jobs: {again}\n")
+    );
+    folder.write("shots/go", "");
+    folder.ends(again.strip_prefix("candelabra ").unwrap(), 0);
+    assert_eq!(folder.read("shots/trace"), "a\nb\na\nb\nc\n");
 }
 
 #[test]

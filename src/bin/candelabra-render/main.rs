@@ -1,20 +1,24 @@
 //! `candelabra-render`: renders the frames of a shot through a light tree.
 
+#![warn(clippy::print_stderr)]
+
 mod arguments;
 #[path = "../candelabra/display.rs"]
 mod display;
 #[path = "../candelabra/lost_pages.rs"]
 mod lost_pages;
+#[path = "../candelabra/stderr.rs"]
+mod stderr;
 #[path = "../candelabra/stop.rs"]
 mod stop;
 
 use arguments::{Arguments, StatsForm};
-use candelabra::page::Plain;
 use candelabra::pipeline::{RenderError, RenderReport};
 use clap::Parser;
 use display::Display;
 use std::io::Write;
 use std::process::ExitCode;
+use stderr::say;
 use stop::{STOPPED, Stop};
 
 /// Some frames failed, or nothing could be rendered at all.
@@ -29,7 +33,7 @@ fn main() -> ExitCode {
     match run(&arguments) {
         Ok(code) => code.into(),
         Err(error) => {
-            say(format_args!("{error:#}"));
+            say(format_args!("candelabra-render: {error:#}"));
             ExitCode::from(match error.downcast_ref::<RenderError>() {
                 Some(error) if error.is_bad_tree() => BAD_TREE,
                 Some(error) if error.is_usage() => USAGE,
@@ -59,12 +63,17 @@ fn code_of(report: &RenderReport, stop: &Stop) -> u8 {
     let frames = &report.frames;
     if report.stopped {
         let (done, asked) = (frames.done + frames.up_to_date, frames.asked);
-        say(format_args!("stopped; {done} of {asked} frames are done; go on with --resume"));
+        say(format_args!(
+            "candelabra-render: stopped; {done} of {asked} frames are done; go on with --resume"
+        ));
         return STOPPED + stop.signal().unwrap_or_default();
     }
     if frames.failed > 0 {
         let plural = if frames.failed == 1 { "" } else { "s" };
-        say(format_args!("{} frame{plural} failed; any others are done", frames.failed));
+        say(format_args!(
+            "candelabra-render: {} frame{plural} failed; any others are done",
+            frames.failed
+        ));
         return FAILED;
     }
     0
@@ -86,9 +95,4 @@ fn peak_memory_bytes() -> Option<u64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
     Some(line.trim().strip_suffix("kB")?.trim().parse::<u64>().ok()? * 1024)
-}
-
-/// Says something on standard error. That nobody listens any more is no reason to panic.
-fn say(what: impl std::fmt::Display) {
-    let _ = writeln!(std::io::stderr(), "candelabra-render: {}", Plain(what));
 }

@@ -1,6 +1,7 @@
 //! `candelabra build`: a scene in, a tree file out.
 
 use crate::display::{Display, Progress};
+use crate::stderr::say;
 use crate::stop::{STOPPED, Stop};
 use anyhow::Result;
 use candelabra::page::{Lines, counted};
@@ -63,7 +64,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let display = Display::new(arguments.progress, &stop);
     let report = match job.run(&display) {
         Err(BuildError::Stopped) => {
-            eprintln!("candelabra: {}", BuildError::Stopped);
+            say(format_args!("candelabra: {}", BuildError::Stopped));
             return Ok((STOPPED + stop.signal().unwrap_or_default()).into());
         }
         report => report?,

@@ -1,6 +1,7 @@
 //! `candelabra diff`: what changed between two versions of a scene, and by how much.
 
 use crate::page;
+use crate::stderr::say;
 use anyhow::{Result, bail};
 use candelabra::diff::{
     DiffOptions, Side, SideError, Text, compare, compare_folders, html, look_at_both,
@@ -65,7 +66,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
                 bail!("{}: is a tree; a view is one of scenes", arguments.before.display());
             }
             if let Some(note) = look_at_both(&mut before, &mut after, &arguments.view)? {
-                eprintln!("note: {note}");
+                say(format_args!("note: {note}"));
             }
             let for_page = arguments.html.is_some();
             let options = DiffOptions { unchanged: for_page, heat: for_page };

@@ -1,5 +1,6 @@
 //! What the user or the farm sees of a job: bars, lines, or a protocol.
 
+use crate::stderr::say;
 use crate::stop::Stop;
 use candelabra::page::Plain;
 use candelabra::pipeline::{Event, Watch};
@@ -42,7 +43,7 @@ pub struct Progress {
 }
 
 /// Farms take a silent program for a dead one.
-const LONGEST_SILENCE: Duration = Duration::from_secs(55);
+pub const LONGEST_SILENCE: Duration = Duration::from_secs(55);
 /// Steps of a bar.
 const STEPS: u64 = 10_000;
 
@@ -182,9 +183,7 @@ impl Shared {
             Event::FrameFailed { frame, why } => format!("frame {frame}: failed: {why}"),
             _ => return,
         };
-        self.bar.suspend(|| {
-            let _ = writeln!(std::io::stderr(), "{}", Plain(text));
-        });
+        self.bar.suspend(|| say(text));
     }
 
     /// Says how far the job is, in a line that no event asks for.

@@ -1,11 +1,12 @@
 //! `candelabra inspect`: what is in a scene or in a tree file.
 
 use crate::page;
+use crate::stderr::say;
 use anyhow::{Context, Result};
 use candelabra::emitter::Emitters;
 use candelabra::inspect::{self, SceneReport, TreeReport};
 use candelabra::light_tree::LightTree;
-use candelabra::page::{Lines, Plain, Short, counted, plain_json};
+use candelabra::page::{Lines, Short, counted, plain_json};
 use candelabra::pipeline::{self, Strict};
 use clap::Args;
 use serde::Serialize;
@@ -52,7 +53,7 @@ pub fn run(arguments: &Arguments) -> Result<()> {
 fn show_scene(arguments: &Arguments) -> Result<()> {
     let scene = pipeline::load_scene(&arguments.file)?;
     if let Some(Err(refused)) = arguments.strict.as_ref().map(|strict| strict.check(&scene)) {
-        scene.notes.iter().for_each(|note| eprintln!("note: {}", Plain(note)));
+        scene.notes.iter().for_each(|note| say(format_args!("note: {note}")));
         return Err(refused.into());
     }
     let emitters = Emitters::collect(&scene);

@@ -1,5 +1,7 @@
 //! `candelabra`: builds light trees and looks into them.
 
+#![warn(clippy::print_stderr)]
+
 mod build;
 mod diff;
 mod display;
@@ -12,11 +14,11 @@ mod race;
 mod run;
 mod run_display;
 mod shot;
+mod stderr;
 mod stop;
 mod texture_bar;
 mod verify;
 
-use candelabra::page::Plain;
 use candelabra::pipeline::ViewError;
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
@@ -66,7 +68,7 @@ const USAGE: u8 = 2;
 fn main() -> ExitCode {
     let command = Arguments::parse().command;
     if let Err(error) = lost_pages::explain(command.lost().into()) {
-        eprintln!("candelabra: {error}");
+        stderr::say(format_args!("candelabra: {error}"));
         return FAILED.into();
     }
     let done = |()| ExitCode::SUCCESS;
@@ -85,7 +87,7 @@ fn main() -> ExitCode {
         // A reader that has seen enough (`| head`) is no failure.
         Err(error) if is_closed_pipe(&error) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("candelabra: {}", Plain(format_args!("{error:#}")));
+            stderr::say(format_args!("candelabra: {error:#}"));
             match command {
                 Command::Diff(_) => diff::TROUBLE.into(),
                 _ if run::is_usage(&error) => USAGE.into(),

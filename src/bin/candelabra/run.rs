@@ -1,16 +1,18 @@
 //! `candelabra run`: a pipeline, carried out on this machine.
 
-use crate::run_display::{Display, Progress};
+use crate::display::Progress;
+use crate::run_display::Display;
+use crate::stderr::say;
 use anyhow::Result;
 use candelabra::farm::{
     Job, JobError, OpenCueError, Outcome, Plan, PlanError, RunOptions, Selection, Summary, Task,
-    log_path, read_jobs, run as carry_out,
+    check_logs, log_path, read_jobs, run as carry_out,
 };
 use candelabra::page::Plain;
 use candelabra::render::frames::Frames;
 use clap::Args;
 use std::io::{self, Write};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 /// Carries out the jobs of a pipeline on this machine, layer by layer, chunk by chunk.
@@ -40,8 +42,7 @@ pub struct Arguments {
     /// The folder of the logs, seen from the folder in which commands run
     #[arg(long, value_name = "FOLDER", default_value = LOGS)]
     logs: PathBuf,
-    /// How progress is told
-    #[arg(long, value_enum, default_value_t = Progress::Auto)]
+    #[command(flatten)]
     progress: Progress,
 }
 
@@ -81,36 +82,52 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
         Ok(jobs) => jobs,
         Err(refused) => {
             for error in refused {
-                eprintln!("candelabra: {}", Plain(error));
+                say(format_args!("candelabra: {error}"));
             }
             return Ok(USAGE.into());
         }
     };
     let selection = arguments.wanted.selection();
-    let plans: Vec<Plan> =
-        jobs.iter().map(|job| Plan::new(job, &selection)).collect::<Result<_, _>>()?;
+    let plan = |job| -> Result<_> { Ok((Plan::new(job, &selection)?, options(arguments, job)?)) };
+    let runs: Vec<(Plan, RunOptions)> = jobs.iter().map(plan).collect::<Result<_>>()?;
+    check_logs(&runs)?;
     if arguments.dry_run {
-        plans.iter().try_for_each(|plan| print_commands(plan, &options(arguments, plan.job)?))?;
+        runs.iter().try_for_each(|(plan, options)| print_commands(plan, options))?;
         return Ok(ExitCode::SUCCESS);
     }
-    let mut display = Display::new(arguments.progress, &plans)?;
-    let (mut is_done, mut signal) = (true, None);
-    for plan in &plans {
-        let options = options(arguments, plan.job)?;
+    let layers = runs.iter().flat_map(|(plan, _)| &plan.layers);
+    let frames = layers.map(|planned| planned.frames.len()).sum();
+    let mut display = Display::new(arguments.progress.form, frames)?;
+    let (mut is_done, mut rest) = (true, runs.iter());
+    while let Some((plan, options)) = rest.next() {
         display.begin(plan);
-        let summary = carry_out(plan, &options, &mut display)?;
-        display.end(&summarise(arguments, plan, &options, &summary), summary.is_done());
+        let summary = match carry_out(plan, options, &mut display) {
+            Ok(summary) => summary,
+            Err(error) => {
+                display.end(&format!("{}: not begun: {error}", plan.job.name), false);
+                is_done = false;
+                continue;
+            }
+        };
+        display.end(&summarise(arguments, plan, options, &summary), summary.is_done());
         is_done &= summary.is_done();
-        signal = summary.signal;
-        if signal.is_some() {
-            break;
+        if let Some(signal) = summary.signal {
+            tell_rest(arguments, rest.map(|(plan, _)| plan.job.name.clone()).collect());
+            return Ok(u8::try_from(128 + signal).unwrap_or(FAILED).into());
         }
     }
-    Ok(match (signal, is_done) {
-        (Some(signal), _) => u8::try_from(128 + signal).unwrap_or(FAILED).into(),
-        (None, false) => FAILED.into(),
-        (None, true) => ExitCode::SUCCESS,
-    })
+    Ok(if is_done { ExitCode::SUCCESS } else { FAILED.into() })
+}
+
+/// Says which jobs of a folder a signal has kept from beginning, and how to go on with all.
+fn tell_rest(arguments: &Arguments, names: Vec<String>) {
+    if !names.is_empty() {
+        let names =
+            names.into_iter().map(|name| format!("  {name} not begun: the run was stopped"));
+        shortened(names.collect(), "jobs").iter().for_each(say);
+        let all = again(arguments, &arguments.jobs, &arguments.wanted.layer);
+        say(format_args!("go on with all jobs: {all}"));
+    }
 }
 
 fn options(arguments: &Arguments, job: &Job) -> io::Result<RunOptions> {
@@ -150,43 +167,49 @@ fn summarise(
         )),
         _ => None,
     });
-    lines.extend(shortened(failed.collect()));
+    lines.extend(shortened(failed.collect(), "tasks"));
     let waiting = summary.tasks.iter().filter_map(|(task, outcome)| match outcome {
         Outcome::Blocked { by } => Some(format!("  {} not run: it waits for {by}", task.name)),
         Outcome::Stopped => Some(format!("  {} not done: the run was stopped", task.name)),
         _ => None,
     });
-    lines.extend(shortened(waiting.collect()));
+    lines.extend(shortened(waiting.collect(), "tasks"));
     if !summary.is_done() {
-        lines.push(format!("go on with: {}", again(arguments, plan, summary)));
+        let again = again(arguments, &plan.job.path, &layers_left(plan, summary));
+        lines.push(format!("go on with: {again}"));
     }
     lines.join("\n")
 }
 
-fn shortened(mut lines: Vec<String>) -> Vec<String> {
+fn shortened(mut lines: Vec<String>, what: &str) -> Vec<String> {
     if lines.len() > LISTED {
         let more = lines.len() - LISTED;
         lines.truncate(LISTED);
-        lines.push(format!("  ... and {more} more tasks"));
+        lines.push(format!("  ... and {more} more {what}"));
     }
     lines
 }
 
-/// The command that carries out what is left.
-fn again(arguments: &Arguments, plan: &Plan, summary: &Summary) -> String {
+/// The layers of which not all is done.
+fn layers_left(plan: &Plan, summary: &Summary) -> Vec<String> {
+    let is_left = |place: usize| {
+        let is_missed = |(task, outcome): &(Task, Outcome)| {
+            task.layer == place && !matches!(outcome, Outcome::Done { .. })
+        };
+        summary.tasks.iter().any(is_missed)
+    };
+    let left = (0..plan.layers.len()).filter(|&place| is_left(place));
+    left.map(|place| plan.layers[place].layer.name.clone()).collect()
+}
+
+/// The command that carries out layers of jobs, with the options of this run.
+fn again(arguments: &Arguments, jobs: &Path, layers: &[String]) -> String {
     let word = |text: &str| {
         shlex::try_quote(text).map_or_else(|_| text.to_owned(), |quoted| quoted.into_owned())
     };
-    let mut words = vec!["candelabra run".into(), word(&plan.job.path.display().to_string())];
+    let mut words = vec!["candelabra run".into(), word(&jobs.display().to_string())];
     let mut option = |name: &str, value: &str| words.push(format!("{name} {}", word(value)));
-    let is_left = |place: usize| {
-        let is_missed = |(task, outcome): &&(Task, Outcome)| {
-            task.layer == place && !matches!(outcome, Outcome::Done { .. })
-        };
-        summary.tasks.iter().any(|entry| is_missed(&entry))
-    };
-    let left = (0..plan.layers.len()).filter(|&place| is_left(place));
-    left.for_each(|place| option("--layer", &plan.layers[place].layer.name));
+    layers.iter().for_each(|layer| option("--layer", layer));
     if let Some(frames) = &arguments.wanted.frames {
         option("--frames", &candelabra::farm::range::format(frames.as_slice()));
     }

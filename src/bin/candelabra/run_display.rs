@@ -1,10 +1,12 @@
 //! How a run is shown: bars of the layers on a terminal, lines elsewhere, marks for programs.
 
+use crate::display::{Form, LONGEST_SILENCE};
+use crate::stderr::say;
+use crate::stop::signals;
 use anyhow::Result;
 use candelabra::farm::{Fault, Outcome, Plan, RunEvent, RunWatch, Task, range};
 use candelabra::page::Plain;
 use candelabra::pipeline::Event;
-use clap::ValueEnum;
 use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressStyle};
 use serde_json::json;
 use std::fmt::Display as Show;
@@ -13,37 +15,21 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
-/// How progress is told.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum Progress {
-    /// Bars on a terminal, else lines
-    Auto,
-    /// A line when a task begins and ends, and at least one a minute
-    Plain,
-    /// Lines that Alfred and Tractor read: ALF_PROGRESS 42%
-    Alfred,
-    /// Lines that OpenJD reads: openjd_progress: 42
-    Openjd,
-    /// One JSON object a line
-    Json,
-    /// Nothing
-    None,
-}
-
 /// Parts of a frame that a bar shows.
 const PARTS: f64 = 1000.0;
-/// The longest time without a line.
-const SILENCE: Duration = Duration::from_secs(55);
 
 /// Shows a run and hears signals.
 pub struct Display {
-    progress: Progress,
+    form: Form,
+    /// Whether lines are printed in place of bars.
+    is_plain: bool,
     signal: Arc<AtomicUsize>,
     bars: MultiProgress,
     layers: Vec<LayerBar>,
-    /// Frames of all tasks, of those that have ended, and the part of those of the running one that is done.
+    /// Frames of all tasks, of those that have ended, of the running one, and the part of these that is done.
     all: usize,
     ended: usize,
+    running: usize,
     part: f64,
     /// When the running task was started, and when something was said last.
     began: Instant,
@@ -52,30 +38,27 @@ pub struct Display {
 }
 
 impl Display {
-    /// A display for all plans; SIGINT, SIGTERM and SIGHUP are heard from now on.
-    pub fn new(progress: Progress, plans: &[Plan]) -> Result<Display> {
-        let progress = match progress {
-            Progress::Auto if !io::stderr().is_terminal() => Progress::Plain,
-            other => other,
-        };
+    /// A display for so many frames; [`signals`] are heard from now on. They end nothing: the running command
+    /// has to be stopped first.
+    pub fn new(form: Form, frames: usize) -> Result<Display> {
+        let is_plain = form == Form::Auto && !io::stderr().is_terminal();
         let signal = Arc::new(AtomicUsize::new(0));
-        for number in
-            [signal_hook::consts::SIGINT, signal_hook::consts::SIGTERM, signal_hook::consts::SIGHUP]
-        {
+        for number in signals() {
             signal_hook::flag::register_usize(number, signal.clone(), number as usize)?;
         }
-        let layers = plans.iter().flat_map(|plan| &plan.layers);
         let (began, said) = (Instant::now(), Instant::now());
         Ok(Display {
-            progress,
+            form,
+            is_plain,
             signal,
-            bars: match progress {
-                Progress::Auto => MultiProgress::new(),
+            bars: match form {
+                Form::Auto if !is_plain => MultiProgress::new(),
                 _ => MultiProgress::with_draw_target(ProgressDrawTarget::hidden()),
             },
             layers: Vec::new(),
-            all: layers.map(|planned| planned.frames.len()).sum(),
+            all: frames,
             ended: 0,
+            running: 0,
             part: 0.0,
             began,
             said,
@@ -88,11 +71,9 @@ impl Display {
         let layers: Vec<_> =
             plan.layers.iter().map(|planned| planned.layer.name.as_str()).collect();
         let job = &plan.job.name;
-        match self.progress {
-            Progress::Plain => self.line(format_args!("{job}: {}", layers.join(", "))),
-            Progress::Json => {
-                self.line(json!({"event": "job-started", "job": job, "layers": layers}))
-            }
+        match self.form {
+            Form::Auto if self.is_plain => self.line(format_args!("{job}: {}", layers.join(", "))),
+            Form::Json => self.line(json!({"event": "job-started", "job": job, "layers": layers})),
             _ => {}
         }
         let width = plan.layers.iter().map(|planned| planned.layer.name.len()).max().unwrap_or(0);
@@ -118,9 +99,9 @@ impl Display {
         for layer in self.layers.drain(..) {
             layer.bar.abandon();
         }
-        match (is_done, self.progress) {
-            (false, _) => summary.lines().for_each(|line| eprintln!("{}", Plain(line))),
-            (true, Progress::Auto | Progress::Plain) => self.line(summary),
+        match (is_done, self.form) {
+            (false, _) => summary.lines().for_each(|line| self.complain(line)),
+            (true, Form::Auto) => self.line(summary),
             (true, _) => {}
         }
     }
@@ -128,30 +109,52 @@ impl Display {
     /// A line on standard output. A closed pipe (`| head`) stops no run.
     fn line(&mut self, text: impl Show) {
         self.said = Instant::now();
-        let mut out = io::stdout().lock();
-        let _ = writeln!(out, "{}", Plain(text)).and_then(|()| out.flush());
+        self.bars.suspend(|| {
+            let mut out = io::stdout().lock();
+            let _ = writeln!(out, "{}", Plain(text)).and_then(|()| out.flush());
+        });
+    }
+
+    /// A line on standard error.
+    fn complain(&self, text: impl Show) {
+        self.bars.suspend(|| say(text));
+    }
+
+    /// How much of all is done, from 0 to 1.
+    fn done(&self) -> f64 {
+        (self.ended as f64 + self.part * self.running as f64) / self.all.max(1) as f64
+    }
+
+    /// How far all is, in the words of a protocol, if one is spoken. In JSON it is the event of our other programs,
+    /// so a run in a run is understood.
+    fn mark(&self) -> Option<String> {
+        let done = self.done();
+        let percent = (100.0 * done) as u64;
+        match self.form {
+            Form::Alfred => Some(format!("ALF_PROGRESS {percent}%")),
+            Form::Openjd => Some(format!("openjd_progress: {percent}")),
+            Form::Json => serde_json::to_string(&Event::Progress { done, frame: None }).ok(),
+            Form::Auto | Form::None => None,
+        }
     }
 
     /// Tells how far all is, if that is another percent than before.
-    fn percent(&mut self, task: &Task) {
-        let done = (self.ended as f64 + self.part * task.frames.len() as f64) / self.all as f64;
-        let percent = (100.0 * done) as u64;
-        if self.percent.replace(percent) != Some(percent) {
-            match self.progress {
-                Progress::Alfred => self.line(format_args!("ALF_PROGRESS {percent}%")),
-                Progress::Openjd => self.line(format_args!("openjd_progress: {percent}")),
-                _ => {}
-            }
+    fn percent(&mut self) {
+        let percent = (100.0 * self.done()) as u64;
+        if self.percent.replace(percent) != Some(percent)
+            && let Some(mark) = self.mark()
+        {
+            self.line(mark);
         }
     }
 
     fn started(&mut self, task: &Task, attempt: u32, log: &std::path::Path) {
-        (self.began, self.part) = (Instant::now(), 0.0);
+        (self.began, self.running, self.part) = (Instant::now(), task.frames.len(), 0.0);
         let (name, frames) = (&task.name, range::format(&task.frames));
-        match self.progress {
-            Progress::Plain => self.line(format_args!("{name}: frames {frames}")),
-            Progress::Openjd => self.line(format_args!("openjd_status: {name}")),
-            Progress::Json => self.line(json!({
+        match self.form {
+            Form::Auto if self.is_plain => self.line(format_args!("{name}: frames {frames}")),
+            Form::Openjd => self.line(format_args!("openjd_status: {name}")),
+            Form::Json => self.line(json!({
                 "event": "task-started", "task": name, "frames": frames, "attempt": attempt, "log": log,
             })),
             _ => {}
@@ -166,11 +169,11 @@ impl Display {
         if let Event::Progress { done, .. } = event {
             self.part = done.clamp(0.0, 1.0);
         }
-        if self.progress == Progress::Json {
+        if self.form == Form::Json {
             self.line(json!({"event": "task-told", "task": task.name, "told": event}));
         }
         self.show(task, event);
-        self.percent(task);
+        self.percent();
         self.heartbeat();
     }
 
@@ -184,11 +187,11 @@ impl Display {
                 layer.bar.set_message(format!("{frame}{left}"));
             }
             Event::Stage { name } => layer.bar.set_message(name.clone()),
-            Event::FrameDone { frame, seconds, .. } if self.progress == Progress::Plain => {
+            Event::FrameDone { frame, seconds, .. } if self.is_plain => {
                 let left = layer.advance(self.part * task.frames.len() as f64);
                 self.line(format_args!("  frame {frame} in {seconds:.1} s, {left}"));
             }
-            Event::FrameFailed { frame, why } if self.progress == Progress::Plain => {
+            Event::FrameFailed { frame, why } if self.is_plain => {
                 self.line(format_args!("  frame {frame} failed: {why}"));
             }
             _ => {}
@@ -196,17 +199,17 @@ impl Display {
     }
 
     fn again(&mut self, task: &Task, fault: &Fault) {
-        match self.progress {
-            Progress::Json => self.line(json!({
+        match self.form {
+            Form::Json => self.line(json!({
                 "event": "task-failed", "task": task.name, "why": fault.to_string(), "again": true,
             })),
-            Progress::None => {}
-            _ => self.bars.suspend(|| eprintln!("{}: {}; once more", task.name, Plain(fault))),
+            Form::None => {}
+            _ => self.complain(format_args!("{}: {fault}; once more", task.name)),
         }
     }
 
     fn ended(&mut self, task: &Task, outcome: &Outcome) {
-        (self.ended, self.part) = (self.ended + task.frames.len(), 0.0);
+        (self.ended, self.running, self.part) = (self.ended + task.frames.len(), 0, 0.0);
         let (code, text) = match outcome {
             Outcome::Done { up_to_date: true } => ("up-to-date", "up to date".into()),
             Outcome::Done { .. } => ("done", format!("done in {}", time(self.began.elapsed()))),
@@ -214,9 +217,9 @@ impl Display {
             Outcome::Blocked { by } => ("blocked", format!("not run, {by} has failed")),
             Outcome::Stopped => ("stopped", "stopped".into()),
         };
-        match self.progress {
-            Progress::Plain => self.line(format_args!("{}: {text}", task.name)),
-            Progress::Json => self.line(json!({
+        match self.form {
+            Form::Auto if self.is_plain => self.line(format_args!("{}: {text}", task.name)),
+            Form::Json => self.line(json!({
                 "event": "task-ended", "task": task.name, "outcome": code, "text": text,
             })),
             _ => {}
@@ -224,24 +227,22 @@ impl Display {
         if let Some(layer) = self.layers.get_mut(task.layer) {
             layer.end(task.frames.len(), outcome, text);
         }
-        self.percent(task);
+        self.percent();
     }
 
     /// Says something if nothing was said for long.
     fn heartbeat(&mut self) {
-        if self.said.elapsed() > SILENCE {
-            let (percent, minutes) = ((100.0 * self.part) as u64, time(self.began.elapsed()));
-            match self.progress {
-                Progress::Plain => self.line(format_args!("  {percent} % after {minutes}")),
-                Progress::Openjd => {
-                    self.line(format_args!("openjd_status: {percent} % after {minutes}"))
-                }
-                Progress::Alfred => {
-                    self.line(format_args!("ALF_PROGRESS {}%", self.percent.unwrap_or(0)))
-                }
-                _ => {}
-            }
+        if self.said.elapsed() > LONGEST_SILENCE
+            && let Some(sign) = self.sign_of_life()
+        {
+            self.line(sign);
         }
+    }
+
+    fn sign_of_life(&self) -> Option<String> {
+        let (percent, minutes) = ((100.0 * self.part) as u64, time(self.began.elapsed()));
+        let plain = || self.is_plain.then(|| format!("  {percent} % after {minutes}"));
+        self.mark().or_else(plain)
     }
 }
 
@@ -311,5 +312,27 @@ fn time(time: Duration) -> String {
         (0, 0, seconds) => format!("{seconds} s"),
         (0, minutes, seconds) => format!("{minutes}:{seconds:02}"),
         (hours, minutes, seconds) => format!("{hours}:{minutes:02}:{seconds:02}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_form_that_speaks_has_a_sign_of_life() {
+        let sign = |form, is_plain| {
+            let mut display = Display::new(form, 8).unwrap();
+            (display.is_plain, display.ended, display.running, display.part) =
+                (is_plain, 2, 4, 0.5);
+            display.sign_of_life()
+        };
+        assert_eq!(sign(Form::Alfred, false).unwrap(), "ALF_PROGRESS 50%");
+        assert_eq!(sign(Form::Openjd, false).unwrap(), "openjd_progress: 50");
+        assert!(sign(Form::Auto, true).unwrap().starts_with("  50 % after "));
+        let event: Event = serde_json::from_str(&sign(Form::Json, false).unwrap()).unwrap();
+        assert_eq!(event, Event::Progress { done: 0.5, frame: None });
+        // Bars are seen to live.
+        assert_eq!((sign(Form::Auto, false), sign(Form::None, false)), (None, None));
     }
 }

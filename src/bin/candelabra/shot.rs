@@ -1,5 +1,6 @@
 //! What the commands that look at one frame of a shot have in common.
 
+use crate::stderr::say;
 use anyhow::{Context, Result, anyhow};
 use candelabra::emitter::Emitters;
 use candelabra::light_tree::LightTree;
@@ -37,7 +38,7 @@ impl Shot {
         let name = || arguments.scene.display().to_string();
         let Look { camera, note } = pipeline::look(&mut scene, &arguments.view, aspect)?;
         if let Some(note) = note {
-            eprintln!("note: {note}");
+            say(format_args!("note: {note}"));
         }
         let emitters = Emitters::collect(&scene);
         let frame = arguments.frame.unwrap_or_else(|| pipeline::frames_of(&scene)[0]);

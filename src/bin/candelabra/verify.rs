@@ -1,9 +1,10 @@
 //! `candelabra verify`: whether tree files are what the format says.
 
+use crate::stderr::say;
 use crate::texture_bar::TextureBar;
 use anyhow::{Context, Result};
 use candelabra::emitter::Emitters;
-use candelabra::page::{Lines, Plain, counted};
+use candelabra::page::{Lines, counted};
 use candelabra::pipeline::{self, OpenedTree, TreeError};
 use candelabra::scene::Scene;
 use candelabra::store::StoreError;
@@ -62,7 +63,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
         Some(path) => match Owner::load(path, &arguments.force_light) {
             Ok(owner) => Some(owner),
             Err(error) => {
-                eprintln!("candelabra: {}", Plain(format_args!("{error:#}")));
+                say(format_args!("candelabra: {error:#}"));
                 return Ok(ExitCode::from(TROUBLE));
             }
         },
@@ -95,7 +96,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
                 UNSOUND
             }
             Err(error) => {
-                eprintln!("candelabra: {}", Plain(error));
+                say(format_args!("candelabra: {error}"));
                 TROUBLE
             }
         });

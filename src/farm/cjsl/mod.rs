@@ -39,12 +39,28 @@ pub struct Position {
 
 /// Why a text is no valid job file.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
-#[error("{}:{}: {why}", at.line, at.column)]
+#[error("{}:{}: {}", at.line, at.column, shortened(why))]
 pub struct Refusal {
     /// Where.
     pub at: Position,
     /// What is wrong there, with the remedy.
     pub why: String,
+}
+
+/// No message is longer, in characters, however long what the file says.
+const LONGEST_MESSAGE: usize = 800;
+
+/// A message without its middle if it is too long: it begins with the fault and ends with the remedy.
+fn shortened(why: &str) -> String {
+    let half = LONGEST_MESSAGE / 2;
+    let (head, tail) =
+        (why.char_indices().nth(half), why.char_indices().rev().nth(half).map(|(at, _)| at));
+    match (head, tail) {
+        (Some((head, _)), Some(tail)) if head < tail => {
+            format!("{} ... {}", &why[..head], &why[tail..])
+        }
+        _ => why.into(),
+    }
 }
 
 impl Element {

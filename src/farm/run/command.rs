@@ -51,7 +51,7 @@ pub fn run(
     log_path: &Path,
     watch: &mut dyn RunWatch,
 ) -> io::Result<Ending> {
-    let planned = &plan.layers[task.layer];
+    let layer = plan.layers[task.layer].layer;
     let no_log =
         |error: io::Error| io::Error::new(error.kind(), format!("{}: {error}", log_path.display()));
     let mut log = log::open(log_path, attempt).map_err(no_log)?;
@@ -59,17 +59,15 @@ pub fn run(
         .map_err(no_log)?;
     let mut last_line = log.try_clone()?;
     let (output, input) = io::pipe()?;
-    let threads = planned.threads().map_or_else(thread::available_parallelism, |threads| {
-        Ok((threads as usize).try_into().unwrap_or(std::num::NonZero::<usize>::MIN))
-    });
+    let threads = thread::available_parallelism().map_or(1, usize::from);
     let mut command = Command::new("sh");
     command
         .arg("-c")
         .arg(&task.command)
         .current_dir(&options.root)
-        .envs(planned.layer.env.iter().map(|(name, value)| (name, value)))
+        .envs(layer.env.iter().map(|(name, value)| (name, value)))
         .envs(plan.environment(task))
-        .env("CUE_THREADS", threads.map_or(1, usize::from).to_string())
+        .env("CUE_THREADS", threads.to_string())
         .env("CUE_LOG_PATH", options.logs.join(&plan.job.name))
         .env("CANDELABRA_PROGRESS", "json")
         .stdin(Stdio::null())
@@ -107,7 +105,7 @@ pub fn run(
         }
         match &overdue {
             None => {
-                overdue = late(planned.layer, began, heard).map(|fault| (fault, Instant::now()));
+                overdue = late(layer, began, heard).map(|fault| (fault, Instant::now()));
                 if overdue.is_some() {
                     group.send(Signal::TERM);
                 }

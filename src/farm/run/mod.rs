@@ -3,7 +3,8 @@
 //! A command is run by `sh -c` with OpenCue's environment, as RQD does, in the job's root. It has a process
 //! group of its own; when the command ends, what it has left running in there is killed. All that it prints
 //! goes to the log of its task, `LOGS/JOB/1001-render.rqlog`; lines that are [`Event`]s are told to the
-//! [`RunWatch`] and logged in words. Commands use all cores themselves, so two at a time would gain nothing.
+//! [`RunWatch`] and logged in words. Commands use all cores themselves, so two at a time would gain nothing,
+//! and `CUE_THREADS` is the machine's cores, whatever a layer reserves on a farm.
 //!
 //! A task that fails does not stop those that do not wait for it. A signal is passed on to the command, and
 //! what it makes of that is awaited; a second one kills it. The clock is read for timeouts alone.
@@ -11,11 +12,11 @@
 mod command;
 mod log;
 
-use super::job::DependKind;
+use super::job::{DependKind, JobError};
 use super::plan::{Plan, Task};
 use crate::pipeline::Event;
 use command::Ending;
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
 use std::fmt;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -27,7 +28,8 @@ pub struct RunOptions {
     pub root: PathBuf,
     /// The folder of the logs; each job has a folder in there.
     pub logs: PathBuf,
-    /// How often a task that fails is tried again.
+    /// How often a task that fails is tried again, but for one that ends with 2 or 3: usage, or a tree to be
+    /// built again.
     pub retries: u32,
 }
 
@@ -109,6 +111,13 @@ pub enum Fault {
     System(String),
 }
 
+impl Fault {
+    /// Whether another attempt would end alike: usage errors (2), and trees that are stale or broken (3).
+    fn is_final(&self) -> bool {
+        matches!(self, Fault::Code(2 | 3))
+    }
+}
+
 impl fmt::Display for Fault {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
@@ -137,6 +146,22 @@ impl Summary {
     pub fn is_done(&self) -> bool {
         self.tasks.iter().all(|(_, outcome)| matches!(outcome, Outcome::Done { .. }))
     }
+}
+
+/// Checks that each job has a folder of its own for its logs.
+///
+/// # Errors
+/// [`JobError::SameName`], of the first that has not.
+pub fn check_logs(runs: &[(Plan, RunOptions)]) -> Result<(), JobError> {
+    let mut folders = HashMap::new();
+    for (plan, options) in runs {
+        let (name, path) = (&plan.job.name, &plan.job.path);
+        if let Some(other) = folders.insert(options.logs.join(name), path) {
+            let (name, path, other) = (name.clone(), path.clone(), other.clone());
+            return Err(JobError::SameName { name, path, other });
+        }
+    }
+    Ok(())
 }
 
 /// The log of a task.
@@ -204,7 +229,9 @@ fn attempt(
                 *stopped = signal;
                 return Outcome::Stopped;
             }
-            Some(fault) if attempt > options.retries => return Outcome::Failed(fault),
+            Some(fault) if attempt > options.retries || fault.is_final() => {
+                return Outcome::Failed(fault);
+            }
             Some(fault) => watch.tell(RunEvent::Again { task, fault: &fault }),
         }
     }
