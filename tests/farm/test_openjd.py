@@ -1,8 +1,10 @@
 """The OpenJD template, checked and run by `openjd`."""
 
 import json
+import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -88,3 +90,23 @@ def test_many_frames_without_order(tmp_path: Path) -> None:
     frames = ",".join(str(frame * frame % 9973 + frame) for frame in range(3000))
     told = openjd("summary", template(tmp_path, [Layer("many", "true", frames, 7)]))
     assert told.returncode == 0, told.stdout + told.stderr
+
+
+def test_a_command_that_is_cancelled_may_clean_up(tmp_path: Path) -> None:
+    command = "trap 'touch cleaned; exit 3' TERM; touch started; while :; do sleep 0.05; done"
+    path = template(tmp_path, [Layer("long", command)])
+    child = subprocess.Popen([OPENJD, "run", path], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+    end = time.monotonic() + 60
+    while not (tmp_path / "started").exists():
+        assert child.poll() is None and time.monotonic() < end
+        time.sleep(0.05)
+    child.send_signal(signal.SIGINT)
+    told, _ = child.communicate(timeout=120)
+    assert child.returncode != 0 and (tmp_path / "cleaned").exists(), told
+
+
+def test_programs_tell_the_session_how_far_they_are(tmp_path: Path) -> None:
+    told = openjd("run", template(tmp_path, [Layer("asks", 'echo "openjd_status: in $CANDELABRA_PROGRESS"')]))
+    assert told.returncode == 0 and "openjd_status: in openjd" in told.stdout, told.stdout
+    layer = Layer("asks", 'echo "in $CANDELABRA_PROGRESS"', env={"CANDELABRA_PROGRESS": "none"})
+    assert "\tin none" in openjd("run", template(tmp_path, [layer])).stdout

@@ -22,7 +22,7 @@ def test_tasks_see_what_they_see_here(slurm: Slurm, tmp_path: Path) -> None:
 
 def test_dependences_hold_and_a_failure_stops_what_waits(slurm: Slurm, tmp_path: Path) -> None:
     layers = [
-        Layer("first", "touch one"),
+        Layer("first", 'test -d "$CUE_LOG_PATH" && touch one'),
         Layer("middle", "cp one two.#IFRAME# && test #IFRAME# -ne 1003", "1001-1004", 1, after=["first"]),
         Layer("by_frame", "cp two.#IFRAME# three.#IFRAME#", "1001-1004", 1, after=["middle*"]),
         Layer("other_chunks", "touch never", "1001-1004", 2, after=["middle*"]),
