@@ -7,12 +7,12 @@
 use super::agreement::{Standing, standing};
 use super::build::{Rebuilt, build_tree, rebuild_tree};
 use super::fresh::{OpenedTree, TreeError, check_output, open_base};
+use super::read::read_scene;
 use super::{
-    Event, NoLightThere, ShotTrees, Strict, StrictError, Survey, TreeChoice, Watch,
-    collect_emitters, force_lights, frames_of, load_scene, survey, with_trees,
+    Event, ReadError, ShotTrees, Strict, Survey, TreeChoice, Watch, collect_emitters, frames_of,
+    survey, with_trees,
 };
 use crate::emitter::{Emitters, LightOverflow};
-use crate::ingest::IngestError;
 use crate::light_tree::LightTree;
 use crate::render::frames::Frames;
 use crate::scene::Scene;
@@ -111,20 +111,9 @@ impl BreakEven {
 /// Why nothing was built.
 #[derive(Debug, thiserror::Error)]
 pub enum BuildError {
-    /// The scene cannot be read.
+    /// There is no scene to build for.
     #[error(transparent)]
-    Scene(#[from] IngestError),
-    /// It has notes that are errors.
-    #[error(transparent)]
-    Strict(#[from] StrictError),
-    /// It has no light that is to be forced.
-    #[error("{}: {cause}", scene.display())]
-    Force {
-        /// The scene's file.
-        scene: PathBuf,
-        /// The path that has no light.
-        cause: NoLightThere,
-    },
+    Read(#[from] ReadError),
     /// It has a light that no tree can hold.
     #[error("{}: {cause}", scene.display())]
     Overflow {
@@ -268,15 +257,7 @@ impl BuildJob {
 
     /// Reads the scene, and sees whether it can be built there.
     fn load(&self, output: &Path, watch: &dyn Watch) -> Result<Scene, BuildError> {
-        let mut scene = load_scene(&self.scene)?;
-        for note in &scene.notes {
-            watch.tell(Event::Note { text: note.to_string() });
-        }
-        if let Some(strict) = &self.strict {
-            strict.check(&scene)?;
-        }
-        force_lights(&mut scene, &self.force_light)
-            .map_err(|cause| BuildError::Force { scene: self.scene.clone(), cause })?;
+        let scene = read_scene(&self.scene, self.strict.as_ref(), &self.force_light, watch)?;
         let real = |path: &Path| path.canonicalize().ok();
         let is_output = |input: &Path| real(input).is_some() && real(input) == real(output);
         if scene.files.iter().any(|file| is_output(&file.path)) {

@@ -24,6 +24,7 @@ mod frames;
 mod fresh;
 mod look;
 pub mod option;
+mod read;
 mod render_job;
 mod rig;
 mod shot_trees;
@@ -45,6 +46,7 @@ pub use fresh::{
     OpenedTree, StaleTree, TreeError, check_agreement, check_fresh, check_output, is_tree_file,
     open_base, open_tree,
 };
+pub use read::ReadError;
 pub use render_job::{
     FrameCounts, Preview, RenderError, RenderJob, RenderReport, SceneCounts, Seconds,
 };

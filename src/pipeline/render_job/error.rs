@@ -1,7 +1,6 @@
 //! Why a shot cannot be rendered at all.
 
-use crate::ingest::IngestError;
-use crate::pipeline::{NoLightThere, StrictError, TreeError, ViewError};
+use crate::pipeline::{ReadError, TreeError, ViewError};
 use crate::render::PlanError;
 use crate::render::frame_names::FrameNamesError;
 use std::io;
@@ -14,20 +13,9 @@ pub enum RenderError {
     /// The frames would share a name.
     #[error(transparent)]
     Names(#[from] FrameNamesError),
-    /// The scene cannot be read.
+    /// There is no scene to render.
     #[error(transparent)]
-    Scene(#[from] IngestError),
-    /// Notes about the scene were to be taken for errors.
-    #[error(transparent)]
-    Strict(#[from] StrictError),
-    /// A path to be forced leads to no light.
-    #[error("{}: {cause}", scene.display())]
-    Force {
-        /// The scene.
-        scene: PathBuf,
-        /// Which path, and what to do.
-        cause: NoLightThere,
-    },
+    Read(#[from] ReadError),
     /// There is no camera to look through.
     #[error(transparent)]
     View(#[from] ViewError),

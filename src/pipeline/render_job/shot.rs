@@ -2,9 +2,8 @@
 
 use super::{RenderError, RenderJob, SceneCounts};
 use crate::emitter::Emitters;
-use crate::pipeline::{
-    ASPECT, Event, ShotTrees, Watch, force_lights, frames_of, load_scene, look, option,
-};
+use crate::pipeline::read::read_scene;
+use crate::pipeline::{ASPECT, Event, ShotTrees, Watch, frames_of, look, option};
 use crate::render::RenderSettings;
 use crate::render::frames::Frames;
 use crate::scene::{Camera, Scene};
@@ -20,13 +19,7 @@ pub(super) struct Shot {
 impl Shot {
     pub fn read(job: &RenderJob, watch: &dyn Watch) -> Result<Shot, RenderError> {
         let note = |text: String| watch.tell(Event::Note { text });
-        let mut scene = load_scene(&job.scene)?;
-        scene.notes.iter().for_each(|found| note(found.to_string()));
-        if let Some(strict) = &job.strict {
-            strict.check(&scene)?;
-        }
-        force_lights(&mut scene, &job.force_lights)
-            .map_err(|cause| RenderError::Force { scene: job.scene.clone(), cause })?;
+        let mut scene = read_scene(&job.scene, job.strict.as_ref(), &job.force_lights, watch)?;
         if let Some(fog) = &job.fog {
             scene.medium = Some(fog.clone());
         }
