@@ -160,10 +160,10 @@ impl Shared {
             Form::Openjd if is_news => self.tell_openjd(&mut state, &event),
             _ => {}
         }
-        if matches!(self.form, Form::Auto | Form::Alfred | Form::Openjd) {
-            if let Some(line) = line_of(&event) {
-                self.out(&mut state, &line);
-            }
+        if matches!(self.form, Form::Auto | Form::Alfred | Form::Openjd)
+            && let Some(line) = line_of(&event)
+        {
+            self.out(&mut state, &line);
         }
         self.tell_trouble(&event);
     }
