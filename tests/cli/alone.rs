@@ -63,7 +63,7 @@ fn signal(process: u32, name: &str) {
 
 #[test]
 fn a_signal_drops_the_frame_and_keeps_the_finished_ones() {
-    for (name, code) in [("TERM", 143), ("INT", 130)] {
+    for (name, code) in [("TERM", 143), ("INT", 130), ("HUP", 129)] {
         let shot = Shot::moving();
         // The third frame would take for ever.
         shot.render("--frames 1-2 -o a.#.exr --spp 4").ends(0);
