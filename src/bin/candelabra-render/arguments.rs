@@ -11,8 +11,9 @@ use std::path::PathBuf;
 
 /// Renders the frames of a shot through a light tree.
 ///
-/// Exit codes: 0 done, 1 a frame or everything failed, 2 usage, 3 the tree is stale or broken; 128 and a
-/// signal's number if that signal stopped it (130 Ctrl-C, 143 SIGTERM): finished frames are kept.
+/// Exit codes: 0 done, 1 a frame or everything failed, 2 usage, 3 the tree is stale or
+/// broken, or was written to while it was in use; 128 and a signal's number if that signal stopped it (130
+/// Ctrl-C, 143 SIGTERM): finished frames are kept.
 #[derive(Parser)]
 #[command(version, arg_required_else_help = true)]
 pub struct Arguments {

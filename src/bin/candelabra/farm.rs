@@ -8,12 +8,12 @@ use clap::{Args, ValueEnum};
 use std::io::{self, Write};
 use std::path::PathBuf;
 
-/// Writes a job of a pipeline down for a farm.
-///
-/// openjd: a template for `openjd run` and Deadline Cloud. slurm: a script of `sh` that submits the job.
-/// opencue: the job file, made independent of the folder in which it is run; submit it with `cueadmin` or
-/// PyCue's `launchSpecAndWait`. docs/farms.md tells what each farm makes of a job.
 #[derive(Args)]
+#[command(
+    after_help = "openjd: a template for `openjd run` and Deadline Cloud. slurm: a script of sh that submits the job.\n\
+    opencue: the job file, made independent of the folder in which it is run; submit it with cueadmin or\n\
+    PyCue's launchSpecAndWait. docs/farms.md tells what each farm makes of a job."
+)]
 pub struct Arguments {
     /// The job file, CJSL 1.15
     job: PathBuf,

@@ -15,16 +15,14 @@ use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-/// Carries out the jobs of a pipeline on this machine, layer by layer, chunk by chunk.
-///
-/// A job file is an OpenCue job (CJSL 1.15). Its commands are run by `sh`, in the folder that holds
-/// `pipelines/` if the file is in a folder of that name, else in its own. What is up to date the commands
-/// find out themselves, so to go on after a failure or Ctrl-C is to run the same again. docs/farms.md tells
-/// all.
-///
-/// Exit codes: 0 all is done, 1 something failed, 2 usage or a job file that is refused, 128 + n ended by
-/// signal n.
 #[derive(Args)]
+#[command(
+    after_help = "A job file is an OpenCue job (CJSL 1.15); docs/farms.md tells all. Its commands run by sh, in the folder\n\
+    that holds pipelines/ if the file is in a folder of that name, else in its own. What is up to date the\n\
+    commands find out themselves: to go on after a failure or Ctrl-C, run the same again.\n\
+    Exit codes: 0 all is done, 1 something failed, 2 usage or a job file that is refused, 128 + n ended by\n\
+    signal n."
+)]
 pub struct Arguments {
     /// A job file, or a folder of them
     jobs: PathBuf,

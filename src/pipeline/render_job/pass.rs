@@ -37,7 +37,6 @@ pub(super) struct Pass<'a> {
 enum Outcome {
     UpToDate,
     HandedOver,
-    Stopped,
 }
 
 /// Why there is no picture of a frame.
@@ -46,6 +45,8 @@ enum Trouble {
     OfFrame(String),
     /// No other frame will do.
     OfShot(RenderError),
+    /// The job is to stop.
+    Stopped,
 }
 
 impl From<std::io::Error> for Trouble {
@@ -65,7 +66,10 @@ impl From<TreeError> for Trouble {
 
 impl From<render::RenderError> for Trouble {
     fn from(error: render::RenderError) -> Trouble {
-        Trouble::OfFrame(error.to_string())
+        match error {
+            render::RenderError::Stopped => Trouble::Stopped,
+            _ => Trouble::OfFrame(error.to_string()),
+        }
     }
 }
 
@@ -111,13 +115,13 @@ impl<'a> Pass<'a> {
             let before = self.rows.done.load(Relaxed);
             self.rows.frame = frame;
             let outcome = match self.watch.is_stopped() {
-                true => Ok(Outcome::Stopped),
+                true => Err(Trouble::Stopped),
                 false => self.render(frame, writer),
             };
             match outcome {
                 Ok(Outcome::HandedOver) => {}
                 Ok(Outcome::UpToDate) => counts.up_to_date += 1,
-                Ok(Outcome::Stopped) => break,
+                Err(Trouble::Stopped) => break,
                 Err(Trouble::OfShot(error)) => return Err(error),
                 Err(Trouble::OfFrame(why)) => {
                     counts.failed += 1;
@@ -139,21 +143,16 @@ impl<'a> Pass<'a> {
         self.outputs.check_frame(frame)?;
         let exposure = self.exposure()?;
         let stamp = self.stamp(frame)?;
-        self.prepare();
-        let Pass { delegate: Some(delegate), trees, rows, .. } = self else {
-            return Ok(Outcome::Stopped);
-        };
+        let Pass { delegate, shot, emitters, trees, rows, watch, clock, .. } = self;
+        let delegate = prepared(delegate, shot, emitters, *watch, clock);
         let tree = trees.for_frame(frame)?;
-        self.clock.lap(|seconds| &mut seconds.trees);
-        let rendered = match delegate.render(&tree, frame, &*rows) {
-            Err(render::RenderError::Stopped) => return Ok(Outcome::Stopped),
-            rendered => rendered?,
-        };
-        let seconds = self.clock.lap(|seconds| &mut seconds.rendering);
-        self.trees.check_unwritten()?;
+        clock.lap(|seconds| &mut seconds.trees);
+        let rendered = delegate.render(&tree, frame, &*rows)?;
+        let seconds = clock.lap(|seconds| &mut seconds.rendering);
+        trees.check_unwritten()?;
         let is_taken = writer.hand_over(Finished { rendered, stamp, seconds, exposure });
         self.clock.lap(|seconds| &mut seconds.waiting);
-        Ok(if is_taken { Outcome::HandedOver } else { Outcome::Stopped })
+        if is_taken { Ok(Outcome::HandedOver) } else { Err(Trouble::Stopped) }
     }
 
     /// Stops of previews, if there are any.
@@ -162,10 +161,8 @@ impl<'a> Pass<'a> {
         if let Some(stops) = preview.exposure.or(self.exposure) {
             return Ok(Some(stops));
         }
-        self.prepare();
-        let Pass { delegate: Some(delegate), trees, shot, emitters, watch, .. } = self else {
-            return Ok(None);
-        };
+        let Pass { delegate, shot, emitters, trees, watch, clock, .. } = self;
+        let delegate = prepared(delegate, shot, emitters, *watch, clock);
         let frame = frames_of(&shot.scene)[0];
         let stops = match trees.for_frame(frame) {
             // The file may be of other frames; the exposure is the same all the same.
@@ -214,18 +211,23 @@ impl<'a> Pass<'a> {
         self.clock.lap(|seconds| &mut seconds.resume);
         Ok(true)
     }
+}
 
-    /// Prepares what rays hit, unless that is done.
-    fn prepare(&mut self) {
-        if self.delegate.is_some() {
-            return;
-        }
-        self.watch.tell(Event::Stage { name: "preparing rays".into() });
-        let Shot { scene, camera, settings, .. } = self.shot;
-        let (camera, settings) = (camera.clone(), settings.clone());
-        self.delegate = Some(RenderDelegate::new(scene, self.emitters, camera, settings));
-        self.clock.lap(|seconds| &mut seconds.rays);
-    }
+/// The delegate, with what rays hit prepared.
+fn prepared<'d, 'a>(
+    delegate: &'d mut Option<RenderDelegate<'a>>,
+    shot: &'a Shot,
+    emitters: &'a Emitters,
+    watch: &dyn Watch,
+    clock: &mut Clock,
+) -> &'d mut RenderDelegate<'a> {
+    delegate.get_or_insert_with(|| {
+        watch.tell(Event::Stage { name: "preparing rays".into() });
+        let Shot { scene, camera, settings, .. } = shot;
+        let delegate = RenderDelegate::new(scene, emitters, camera.clone(), settings.clone());
+        clock.lap(|seconds| &mut seconds.rays);
+        delegate
+    })
 }
 
 /// Counts rows of pixels over all frames.
