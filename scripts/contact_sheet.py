@@ -51,7 +51,8 @@ def frame_numbers(text: str) -> list[int]:
 def frame_files(pattern: str, numbers: list[int]) -> list[Path]:
     """The files of frames: the last `#`s of a pattern become the number, in as many places at least."""
     head, marks, tail = re.fullmatch(r"(.*?)(#+)([^#]*)", pattern).groups()
-    return [Path(f"{head}{'-' * (number < 0)}{abs(number):0{len(marks)}}{tail}") for number in numbers]
+    # As the renderer names them: the sign takes one of the places.
+    return [Path(f"{head}{number:0{len(marks)}}{tail}") for number in numbers]
 
 
 def contact_sheet(frames: list[Path], columns: int) -> Image.Image:
@@ -99,7 +100,7 @@ def digest_of(sheet: Path) -> str | None:
         with Image.open(sheet) as picture:
             picture.load()
             return picture.info.get(KEYWORD)
-    except (OSError, SyntaxError, ValueError):
+    except (OSError, SyntaxError, ValueError, Image.DecompressionBombError):
         return None
 
 

@@ -109,9 +109,13 @@ fn check(path: &Path, bytes: u64) -> io::Result<()> {
 /// Bytes that are free where a file is, if the system tells.
 fn room(file: &File) -> Option<u64> {
     #[cfg(unix)]
-    return rustix::fs::fstatvfs(file).ok().map(|disk| disk.f_bavail.saturating_mul(disk.f_frsize));
+    {
+        // Some file systems answer with zeros alone.
+        let disk = rustix::fs::fstatvfs(file).ok().filter(|disk| disk.f_blocks > 0)?;
+        Some(disk.f_bavail.saturating_mul(disk.f_frsize))
+    }
     #[cfg(not(unix))]
-    return None;
+    None
 }
 
 /// Removes the temporary files in a folder that killed writers have left; those of other machines, or from

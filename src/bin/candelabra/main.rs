@@ -69,7 +69,7 @@ fn main() -> ExitCode {
     let command = Arguments::parse().command;
     if let Err(error) = lost_pages::explain(command.lost().into()) {
         stderr::say(format_args!("candelabra: {error}"));
-        return FAILED.into();
+        return command.lost().into();
     }
     let done = |()| ExitCode::SUCCESS;
     let outcome = match &command {
@@ -89,7 +89,7 @@ fn main() -> ExitCode {
         Err(error) => {
             stderr::say(format_args!("candelabra: {error:#}"));
             match command {
-                Command::Diff(_) => diff::TROUBLE.into(),
+                Command::Diff(_) | Command::Verify(_) => diff::TROUBLE.into(),
                 _ if run::is_usage(&error) => USAGE.into(),
                 _ if error.downcast_ref().is_some_and(ViewError::is_usage) => USAGE.into(),
                 _ => ExitCode::FAILURE,

@@ -19,7 +19,10 @@ impl Stop {
         let (signal, again) = (Arc::new(AtomicUsize::new(0)), Arc::new(AtomicBool::new(false)));
         for number in signals() {
             // In this order: the first signal does not yet find the flag set.
-            flag::register_conditional_shutdown(number, 128 + number, again.clone())?;
+            // A terminal that closes sends SIGHUP twice.
+            if number != SIGHUP {
+                flag::register_conditional_shutdown(number, 128 + number, again.clone())?;
+            }
             flag::register(number, again.clone())?;
             flag::register_usize(number, signal.clone(), number as usize)?;
         }

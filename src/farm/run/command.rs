@@ -100,6 +100,8 @@ pub fn run(
         if let Some(number) = listener.watch.take_signal() {
             match signal.replace(number) {
                 None => group.send(Signal::from_named_raw(number).unwrap_or(Signal::TERM)),
+                // A terminal that closes sends it twice.
+                Some(_) if number == Signal::HUP.as_raw() => {}
                 Some(_) => group.send(Signal::KILL),
             }
         }

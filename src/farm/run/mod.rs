@@ -112,9 +112,9 @@ pub enum Fault {
 }
 
 impl Fault {
-    /// Whether another attempt would end alike: usage errors (2), and trees that are stale or broken (3).
+    /// Whether another attempt would end alike: a usage error.
     fn is_final(&self) -> bool {
-        matches!(self, Fault::Code(2 | 3))
+        matches!(self, Fault::Code(2))
     }
 }
 
