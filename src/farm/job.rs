@@ -61,6 +61,25 @@ pub struct Layer {
     pub env: Vec<(String, String)>,
 }
 
+#[cfg(test)]
+impl Layer {
+    /// A layer of one frame that does nothing.
+    pub fn example() -> Layer {
+        Layer {
+            name: "layer".into(),
+            kind: LayerKind::Render,
+            command: "true".into(),
+            frames: vec![1],
+            chunk: 1,
+            core_points: None,
+            memory_mib: None,
+            timeout_minutes: None,
+            silence_minutes: None,
+            env: Vec::new(),
+        }
+    }
+}
+
 /// What kind of work a layer is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum LayerKind {

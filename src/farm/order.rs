@@ -65,19 +65,7 @@ mod tests {
     use proptest::prelude::*;
 
     fn layers(count: usize) -> Vec<Layer> {
-        let layer = Layer {
-            name: "layer".into(),
-            kind: LayerKind::Render,
-            command: "true".into(),
-            frames: vec![1],
-            chunk: 1,
-            core_points: None,
-            memory_mib: None,
-            timeout_minutes: None,
-            silence_minutes: None,
-            env: Vec::new(),
-        };
-        vec![layer; count]
+        vec![Layer::example(); count]
     }
 
     proptest! {

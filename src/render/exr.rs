@@ -300,6 +300,15 @@ mod tests {
             fs::write(&part, &whole[..length]).unwrap();
             assert_eq!(read_metadata(&part), None, "{length} bytes of {}", whole.len());
         }
+        // Rot anywhere: blocks that could not be compressed have no checksum of their own.
+        for at in (0..whole.len()).step_by(97) {
+            let mut rotten = whole.clone();
+            rotten[at] ^= 16;
+            fs::write(&part, &rotten).unwrap();
+            assert_eq!(read_metadata(&part), None, "byte {at}");
+        }
+        write_exr(&path, &frame(&[], false), "{}").unwrap();
+        assert!(read_metadata(&path).is_some());
         fs::write(&part, vec![b'x'; 5000]).unwrap();
         assert_eq!(read_metadata(&part), None);
         assert_eq!(read_metadata(&folder.path().join("absent.exr")), None);

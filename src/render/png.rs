@@ -2,8 +2,8 @@
 //!
 //! Not a measurement: the EXR beside it is. Beauty is scaled by `2^exposure`, bent by Narkowicz's
 //! fit of the ACES film curve (2016; 1 becomes 0.80, whites roll off) and encoded as sRGB, over
-//! black. A part of a frame gives a preview of that part alone. Scenes in photometric units are thousands of nits bright, so the exposure can be chosen
-//! from the picture: [`exposure_for`].
+//! black. A part of a frame gives a preview of that part alone. Scenes in photometric units are
+//! thousands of nits bright, so the exposure can be chosen from the picture: [`exposure_for`].
 
 use super::beauty::Beauty;
 use crate::math::color::{Rgb, linear_to_srgb, luminance};

@@ -449,9 +449,3 @@ fn a_rule_goes_before_the_scene_and_the_first_before_the_second() {
         assert!(error.contains(word), "{error}");
     }
 }
-
-#[test]
-fn a_finished_frame_can_be_handed_to_another_thread() {
-    fn is_owned<T: Send + 'static>() {}
-    is_owned::<candelabra::render::RenderedFrame>();
-}

@@ -200,21 +200,14 @@ impl Group {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::farm::{Layer, LayerKind};
+    use crate::farm::Layer;
 
     #[test]
     fn a_command_is_late_when_it_takes_too_long_or_is_silent_too_long() {
-        let layer = |timeout, silence| Layer {
-            name: "late".into(),
-            kind: LayerKind::Render,
-            command: "true".into(),
-            frames: vec![1],
-            chunk: 1,
-            core_points: None,
-            memory_mib: None,
-            timeout_minutes: timeout,
-            silence_minutes: silence,
-            env: Vec::new(),
+        let layer = |timeout_minutes, silence_minutes| Layer {
+            timeout_minutes,
+            silence_minutes,
+            ..Layer::example()
         };
         // A clock that has run for three minutes.
         let began = Instant::now();

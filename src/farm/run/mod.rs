@@ -28,8 +28,7 @@ pub struct RunOptions {
     pub root: PathBuf,
     /// The folder of the logs; each job has a folder in there.
     pub logs: PathBuf,
-    /// How often a task that fails is tried again, but for one that ends with 2 or 3: usage, or a tree to be
-    /// built again.
+    /// How often a task that fails is tried again. One that ends with 2 (usage) is not.
     pub retries: u32,
 }
 
