@@ -134,7 +134,10 @@ impl Shared {
         let mut state = self.state();
         let mut is_news = true;
         match &event {
-            Event::Stage { name } => state.doing.clone_from(name),
+            Event::Stage { name } => {
+                is_news = state.doing != *name;
+                state.doing.clone_from(name);
+            }
             Event::Progress { done, frame } => {
                 state.done = *done;
                 if let Some(frame) = frame {
