@@ -15,6 +15,6 @@ export CANDELABRA_BIN="$release"
 "$release/candelabra" run pipelines/lantern_street.xml ${FRAMES:+--frames "$FRAMES"} "$@"
 
 echo
-echo "frames        out/lantern_street.1001.exr ... (previews: .png beside them)"
+echo "frames        out/lantern_street.####.exr (previews: .png beside them)"
 echo "contact sheet out/contact_sheet.png"
 echo "scene, tree   out/lantern_street.glb, out/lantern_street.ltree"
