@@ -18,6 +18,7 @@
 //! | `pixel`, `parts` | what do a pixel's samples come to? |
 //! | `motion`, `cryptomatte` | where does it move, and what is it? |
 //! | [`buffers`] | where is it all kept? |
+//! | [`noise`] | what is the error of a picture, and where are samples missing? |
 //! | [`exr`], [`beauty`], [`png`] | how does it get to the disk? |
 //! | [`frames`], [`frame_names`] | which frames, and under which names? |
 
@@ -37,6 +38,7 @@ pub mod frames;
 pub mod layers;
 pub mod light_groups;
 mod motion;
+pub mod noise;
 mod parts;
 pub mod path;
 pub mod picker;

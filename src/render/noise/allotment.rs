@@ -1,0 +1,110 @@
+//! Where further samples go.
+//!
+//! A frame's squared error is the mean of `r / n` over its pixels: `r` is what one sample has, `n` are the
+//! samples. For a given sum of samples it is least if they go in proportion to the root of `r` (Neyman
+//! 1934). Noisy places are then noisier than others, but by far less than with as many samples
+//! everywhere. No place may have more than twice the error that is asked of the frame.
+//!
+//! Counts are those at which scrambled nets are good, powers of two in each half and half-way between.
+//! Which pixels have the one count or the next is decided by a fixed mask, so that no contour shows.
+
+use super::estimate::Estimate;
+use crate::math::random::hash;
+
+/// Samples of each pixel.
+pub type Counts = Vec<u32>;
+
+/// How samples are allotted.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Allotment {
+    /// Every pixel gets at least so many samples.
+    pub least: u32,
+    /// No pixel gets more.
+    pub most: u32,
+}
+
+/// A place may have so many times the error of the frame.
+const WORST: f64 = 2.0;
+/// In one pass a pixel's samples at most become so many times as many: its error is not known well
+/// enough for more.
+const GROWTH: f64 = 2.0;
+
+impl Allotment {
+    /// The samples that an error needs in all, each pixel's, as real numbers; pixels that cannot be
+    /// judged get the most. `error` is asked of the frame.
+    pub fn needed(&self, estimate: &Estimate, error: f64) -> Vec<f64> {
+        let wanted = error * error;
+        let pixels = 0..estimate.pixels();
+        let noisy: Vec<f64> = pixels
+            .filter(|&i| estimate.is_noisy(i))
+            .map(|i| estimate.of_one_sample(i))
+            .filter(|r| r.is_finite())
+            .collect();
+        let reached = |scale: f64| {
+            let own = |&r: &f64| r / self.samples_for(r, scale, wanted);
+            noisy.iter().map(own).sum::<f64>() <= wanted * noisy.len() as f64
+        };
+        // The samples are `scale` times the root of r; bisected over all decades.
+        let (mut low, mut high) = (-40.0_f64, 40.0_f64);
+        for _ in 0..60 {
+            let middle = 0.5 * (low + high);
+            *(if reached(middle.exp2()) { &mut high } else { &mut low }) = middle;
+        }
+        let scale = high.exp2();
+        (0..estimate.pixels())
+            .map(|i| match estimate.of_one_sample(i) {
+                _ if estimate.is_spoilt(i) => self.most.into(),
+                r if r.is_finite() => self.samples_for(r, scale, wanted),
+                _ => self.most.into(),
+            })
+            .collect()
+    }
+
+    fn samples_for(&self, r: f64, scale: f64, wanted: f64) -> f64 {
+        let neyman = scale * r.sqrt();
+        neyman.max(r / (WORST * WORST * wanted)).clamp(self.least.into(), self.most.into())
+    }
+
+    /// The counts of the next pass towards what is needed: never fewer than there are, and not many more
+    /// at once. `columns` and `origin` place the pixels in the whole picture.
+    pub fn next(&self, estimate: &Estimate, needed: &[f64]) -> Counts {
+        let count = |(i, &needed): (usize, &f64)| {
+            let now = estimate.samples(i);
+            let wanted = needed.min(GROWTH * now).clamp(self.least.into(), self.most.into());
+            let next = dithered(wanted, mask(i, estimate.width())).min(self.most);
+            next.max(now as u32)
+        };
+        needed.iter().enumerate().map(count).collect()
+    }
+}
+
+/// A fixed number in `[0, 1)` for each pixel.
+fn mask(pixel: usize, width: usize) -> f64 {
+    let word = hash((pixel % width) as u32, !((pixel / width) as u32));
+    f64::from(word) / 4_294_967_296.0
+}
+
+/// One of the two counts around a real number of samples, such that the mean variance is that of the
+/// real number.
+fn dithered(wanted: f64, mask: f64) -> u32 {
+    let (low, high) = levels_around(wanted);
+    let [l, w, h] = [f64::from(low), wanted, f64::from(high)].map(f64::recip);
+    let share_of_low = if l > h { (w - h) / (l - h) } else { 1.0 };
+    if mask < share_of_low { low } else { high }
+}
+
+/// The counts 2, 4, 6, 8, 12, 16, 24, ... on both sides of a number.
+fn levels_around(wanted: f64) -> (u32, u32) {
+    let mut low = 2_u32;
+    loop {
+        let high = if low.is_power_of_two() && low > 2 { low / 2 * 3 } else { next_power(low) };
+        if f64::from(high) >= wanted || high >= 1 << 30 {
+            return if f64::from(low) >= wanted { (low, low) } else { (low, high) };
+        }
+        low = high;
+    }
+}
+
+fn next_power(count: u32) -> u32 {
+    (count + 1).next_power_of_two()
+}

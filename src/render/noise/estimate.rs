@@ -1,0 +1,201 @@
+//! How noisy a picture in the making is.
+
+use super::Grey;
+use super::tent::around;
+
+/// What the two halves of a pixel's samples say.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Halves {
+    /// Samples in each.
+    pub counts: [u32; 2],
+    /// Mean luminance of each.
+    pub means: [f64; 2],
+    /// The sum over all samples of the squared luminance of light that was picked and then found to be
+    /// blocked: what would have come had it not been.
+    pub blocked: f64,
+    /// Whether a sample was left out because it was infinite or no number.
+    pub is_spoilt: bool,
+}
+
+impl Halves {
+    fn samples(&self) -> f64 {
+        f64::from(self.counts[0]) + f64::from(self.counts[1])
+    }
+
+    /// Luminance of the pixel, each half by its count.
+    pub fn luminance(&self) -> f64 {
+        let [a, b] = self.counts.map(f64::from);
+        (a * self.means[0] + b * self.means[1]) / (a + b).max(1.0)
+    }
+
+    /// Variance of [`luminance`](Self::luminance), without bias: a quarter of the squared difference
+    /// where the halves are equal. 0 if there is one sample.
+    pub fn variance(&self) -> f64 {
+        let [a, b] = self.counts.map(f64::from);
+        let off = self.means[0] - self.means[1];
+        off * off * (a * b / ((a + b) * (a + b)).max(1.0))
+    }
+}
+
+/// The noise of a picture, pixel by pixel.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Estimate {
+    width: usize,
+    /// Of each pixel: samples.
+    samples: Vec<f64>,
+    /// Of each pixel: the squared error that one sample would have, from the pixel's own halves.
+    own: Vec<f64>,
+    /// The same, pooled over the neighbours without the pixel itself.
+    pooled: Vec<f64>,
+    /// What blocked light may still add to that.
+    hidden: Vec<f64>,
+    spoilt: Vec<bool>,
+}
+
+/// The error of a frame.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct FrameError {
+    /// The root of the mean squared error of the pixels that have noise.
+    pub error: f64,
+    /// With 95 % certainty it is at most this.
+    pub bound: f64,
+    /// Standard error of the mean squared error.
+    pub uncertainty: f64,
+    /// Pixels that have noise.
+    pub noisy: usize,
+}
+
+/// The frame is divided into so many interleaved lattices, whose spread tells how sure its error is.
+const LATTICES: [usize; 2] = [8, 4];
+/// Quantile of Student's t with 31 degrees of freedom, 95 %.
+const T_95: f64 = 1.696;
+
+impl Estimate {
+    /// Of pixels, row after row.
+    ///
+    /// # Panics
+    /// If they are not whole rows.
+    pub fn of(pixels: &[Halves], width: usize, grey: Grey) -> Estimate {
+        let around = |values: &[f64]| around(values, width, 0.0);
+        let samples: Vec<f64> = pixels.iter().map(Halves::samples).collect();
+        let steadied = steadied(pixels, width);
+        let own: Vec<f64> = pixels
+            .iter()
+            .zip(&steadied)
+            .map(|(pixel, &light)| grey.squared_error(pixel.variance(), light) * pixel.samples())
+            .collect();
+        let blocked: Vec<f64> = pixels
+            .iter()
+            .zip(&steadied)
+            .map(|(pixel, &light)| grey.squared_error(pixel.blocked, light))
+            .collect();
+        let weights = around(&vec![1.0; pixels.len()]);
+        let pooled = around(&own).iter().zip(&weights).map(|(sum, all)| sum / all).collect();
+        // The chance that a light is visible although none of N rays to it got there is about 1 / (N + 2).
+        let hidden = around(&blocked)
+            .iter()
+            .zip(around(&samples))
+            .zip(&weights)
+            .map(|((blocked, samples), all)| {
+                let rays = samples / all * NEIGHBOURS;
+                if samples > 0.0 { blocked / samples / (rays + 2.0) } else { 0.0 }
+            })
+            .collect();
+        let spoilt = pixels.iter().map(|pixel| pixel.is_spoilt).collect();
+        Estimate { width, samples, own, pooled, hidden, spoilt }
+    }
+
+    /// Columns.
+    pub fn width(&self) -> usize {
+        self.width
+    }
+
+    /// Pixels.
+    pub fn pixels(&self) -> usize {
+        self.samples.len()
+    }
+
+    /// Samples of a pixel.
+    pub fn samples(&self, pixel: usize) -> f64 {
+        self.samples[pixel]
+    }
+
+    /// Whether a sample of a pixel was left out: its error cannot be told.
+    pub fn is_spoilt(&self, pixel: usize) -> bool {
+        self.spoilt[pixel]
+    }
+
+    /// The squared error that one sample of a pixel would have, by its neighbours: what decides about
+    /// further samples. It does not depend on the pixel's own samples, so a picture whose counts
+    /// follow it is not biased by them (Kirk and Arvo 1991). A pixel without neighbours has an infinite
+    /// one.
+    pub fn of_one_sample(&self, pixel: usize) -> f64 {
+        let sum = self.pooled[pixel] + self.hidden[pixel];
+        if sum.is_nan() { f64::INFINITY } else { sum }
+    }
+
+    /// The pooled error of a pixel.
+    pub fn error(&self, pixel: usize) -> f64 {
+        (self.of_one_sample(pixel) / self.samples[pixel].max(1.0)).sqrt()
+    }
+
+    /// The error of the frame, from the pixels' own halves: without bias but for what noise does to
+    /// the luminance that it is relative to.
+    pub fn of_frame(&self) -> FrameError {
+        let mut sums = [[0.0; 2]; LATTICES[0] * LATTICES[1]];
+        for (pixel, own) in self.own.iter().enumerate() {
+            if self.is_noisy(pixel) {
+                let (x, y) = (pixel % self.width, pixel / self.width);
+                let sum = &mut sums[y % LATTICES[1] * LATTICES[0] + x % LATTICES[0]];
+                sum[0] += own / self.samples[pixel].max(1.0);
+                sum[1] += 1.0;
+            }
+        }
+        let noisy: f64 = sums.iter().map(|sum| sum[1]).sum();
+        if noisy == 0.0 {
+            return FrameError::default();
+        }
+        let mean = sums.iter().map(|sum| sum[0]).sum::<f64>() / noisy;
+        // The variance of a ratio of sums (Cochran 1977, section 6).
+        let lattices = sums.len() as f64;
+        let spread: f64 = sums.iter().map(|sum| (sum[0] - mean * sum[1]).powi(2)).sum();
+        let uncertainty = (spread * lattices / (lattices - 1.0)).sqrt() / noisy;
+        FrameError {
+            error: mean.sqrt(),
+            bound: (mean + T_95 * uncertainty).sqrt(),
+            uncertainty,
+            noisy: noisy as usize,
+        }
+    }
+
+    /// Whether a pixel or one beside it has noise.
+    pub fn is_noisy(&self, pixel: usize) -> bool {
+        self.pooled[pixel] > 0.0 || self.own[pixel] > 0.0
+    }
+}
+
+/// Pixels in the tent, without its middle.
+const NEIGHBOURS: f64 = 48.0;
+
+/// The luminance of each pixel; where its difference from what is around it may well be noise, the luminance
+/// around it instead. An error relative to a pixel's own noisy luminance is biased: a pixel that
+/// happens to be bright would seem to be less noisy. (The shrinkage of James and Stein, 1961.)
+fn steadied(pixels: &[Halves], width: usize) -> Vec<f64> {
+    let around = |values: &[f64]| around(values, width, 0.0);
+    let light: Vec<f64> = pixels.iter().map(Halves::luminance).collect();
+    let variance: Vec<f64> = pixels.iter().map(Halves::variance).collect();
+    let weights = around(&vec![1.0; pixels.len()]);
+    let (lights, variances) = (around(&light), around(&variance));
+    (0..pixels.len())
+        .map(|i| {
+            if weights[i] == 0.0 {
+                return light[i];
+            }
+            let near = lights[i] / weights[i];
+            let off = light[i] - near;
+            let noise = (variances[i] / weights[i]).max(variance[i]);
+            let kept = if off == 0.0 { 0.0 } else { (1.0 - noise / (off * off)).max(0.0) };
+            near + kept * off
+        })
+        .collect()
+}
