@@ -80,14 +80,14 @@ fn court() -> Stage {
     stage
 }
 
-/// A floor that one lamp lights, through a hole which one ray in a few hundred finds.
-fn crack() -> Stage {
+/// A floor that one lamp lights, through a hole of half a width in metres: which of 0.035 one ray in three
+/// hundred finds, of 0.09 one in fifty.
+fn crack(hole: f64) -> Stage {
     let mut stage = Stage::default();
     stage.quad([4.0; 2], lambert(Vec3::splat(0.5)), facing(DVec3::ZERO, DVec3::Y));
     // Four boards around a small hole, close below a wide lamp.
-    const HOLE: f64 = 0.035;
     for (x, z) in [(1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0)] {
-        let out = DVec3::new(x, 0.0, z) * (2.0 + HOLE);
+        let out = DVec3::new(x, 0.0, z) * (2.0 + hole);
         let wide = if x == 0.0 { [8.0, 4.0] } else { [4.0, 8.0] };
         let place = DVec3::new(0.0, 1.2, 0.0) + out;
         stage.quad(wide, lambert(Vec3::ZERO), facing(place, place - DVec3::Y));
@@ -179,11 +179,12 @@ fn an_error_that_is_asked_for_is_reached() {
 #[test]
 fn samples_that_go_where_the_error_is_do_not_bias_the_picture() {
     const PICTURES: u32 = 400;
-    let stage = crack();
+    let stage = crack(0.09);
     let set = stage.set();
-    let studio = Studio { set: &set, settings: small() };
+    let studio =
+        Studio { set: &set, settings: RenderSettings { width: 12, height: 12, ..settings() } };
     let reference = studio.reference(1 << 12);
-    let goal = ErrorGoal { most: 128, ..goal(0.5, &reference) };
+    let goal = ErrorGoal { most: 1024, ..goal(0.5, &reference) };
     let mean = |luminances: Vec<f64>| luminances.iter().sum::<f64>() / luminances.len() as f64;
     let moments = |values: &[f64]| {
         let mean = values.iter().sum::<f64>() / values.len() as f64;
@@ -202,8 +203,9 @@ fn samples_that_go_where_the_error_is_do_not_bias_the_picture() {
     let z = (a - b) / (var_a + var_b).sqrt();
     counts.sort_unstable();
     let told = format!("{a:.6} and {b:.6}, {:+.2} %, z {z:.2}", 100.0 * (a / b - 1.0));
-    println!("{told}; counts {} to {}", counts[0], counts[counts.len() - 1]);
-    assert!(counts[counts.len() * 9 / 10] > 2 * counts[0], "samples go nowhere");
+    let tenths: Vec<u32> = (0..10).map(|tenth| counts[counts.len() * tenth / 10]).collect();
+    println!("{told}; counts {tenths:?}");
+    assert!(counts[counts.len() * 9 / 10] > 2 * counts[counts.len() / 10], "samples go nowhere");
     assert!((var_a + var_b).sqrt() < 0.01 * b, "{told}: too noisy to tell");
     assert!(z.abs() < 3.3, "{told}");
 }
@@ -211,7 +213,7 @@ fn samples_that_go_where_the_error_is_do_not_bias_the_picture() {
 /// Few rays find the lamp, and after the first pass most pixels are black. That is not convergence.
 #[test]
 fn light_that_few_rays_find_is_not_taken_for_none() {
-    let stage = crack();
+    let stage = crack(0.035);
     let set = stage.set();
     let studio = Studio { set: &set, settings: small() };
     let reference = studio.reference(1 << 12);
@@ -340,8 +342,8 @@ fn frames_of_a_pan_are_equally_noisy() {
     let mut stage = court();
     let mut errors = Vec::new();
     let mut fixed = None;
-    for frame in 0..6 {
-        let turn = f64::from(frame) * 0.25;
+    for frame in 0..4 {
+        let turn = f64::from(frame) * 0.4;
         let node = stage.scene.cameras[0].node as usize;
         let from = DVec3::new(4.0 + turn, 6.0, 5.0 - turn);
         stage.scene.nodes[node].local = aimed(from, DVec3::new(turn, 0.0, 0.0));
@@ -350,8 +352,12 @@ fn frames_of_a_pan_are_equally_noisy() {
         let reference = studio.reference(1 << 11);
         // One goal and one floor for the shot.
         let goal = *fixed.get_or_insert_with(|| goal(0.05, &reference));
-        let (_, picture, _) = studio.to_error(frame, goal);
-        errors.push(reference.compare(&luminances(&picture), goal.grey).error);
+        // What is left is how well the error of one picture can be told.
+        let error = |seed| {
+            let (_, picture, _) = studio.to_error(seed, goal);
+            reference.compare(&luminances(&picture), goal.grey).error
+        };
+        errors.push((0..4).map(|seed| error(4 * frame + seed)).sum::<f64>() / 4.0);
     }
     let [least, most] = [f64::min, f64::max].map(|of| errors.iter().copied().reduce(of).unwrap());
     assert!(most < 1.1 * least, "{errors:?}");
