@@ -10,6 +10,7 @@ use super::node::{self, Link, Node};
 use super::viewer::Viewer;
 use super::wide;
 use crate::bounds::LightBounds;
+use crate::math::built_in;
 use bytemuck::{Pod, Zeroable};
 
 /// Children of a cluster.
@@ -131,7 +132,7 @@ impl Group {
         for (lane, (&i, &j)) in self.axis[0].iter().zip(&self.axis[1]).enumerate() {
             [x[lane], y[lane], z[lane]] = node::decode_axis([i, j]);
         }
-        let is_endless = self.range == [0; WIDTH];
+        let is_endless = !built_in::RANGE || self.range == [0; WIDTH];
         Lanes {
             center: self.center,
             half_extent: [half_extent(0), half_extent(1), half_extent(2)],

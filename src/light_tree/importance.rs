@@ -17,6 +17,7 @@
 //! eight lanes of a group together.
 
 use super::viewer::Receiver;
+use crate::math::built_in;
 use glam::Vec3;
 
 /// A box is called below the horizon only if it is lower by more than this share of its distance and
@@ -107,6 +108,9 @@ impl Cluster {
     /// The share of light that the range leaves at a squared distance, m^2; 0 only surely out of range.
     #[inline(always)]
     pub fn window(&self, nearest2: f32) -> f32 {
+        if !built_in::RANGE {
+            return 1.0;
+        }
         let ratio2 = nearest2 * self.inverse_range2;
         let window = (1.0 - ratio2 * ratio2).max(FLOOR);
         if ratio2 > 1.0 + RANGE_SLACK { 0.0 } else { window }

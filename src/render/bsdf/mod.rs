@@ -26,7 +26,7 @@ mod tests;
 
 use crate::light_tree::Lobes;
 use crate::math::color::{Rgb, luminance};
-use crate::math::{Frame, warp};
+use crate::math::{Frame, built_in, warp};
 use albedo::Albedo;
 use glam::{Vec2, Vec3};
 use std::f32::consts::FRAC_1_PI;
@@ -157,7 +157,7 @@ impl Reflection {
     /// the path then ends without a contribution.
     #[inline]
     pub fn sample(&self, u_lobe: f32, u: Vec2) -> Option<BsdfSample> {
-        let wi = if u_lobe < self.specular_probability? {
+        let wi = if built_in::GLOSSY && u_lobe < self.specular_probability? {
             let h = ggx::sample_normal(self.wo, self.alpha, u);
             (2.0 * self.wo.dot(h) * h - self.wo).normalize()
         } else {
@@ -200,7 +200,7 @@ impl Reflection {
         };
         let mut value = self.diffuse * cos_i;
         let mut pdf = (1.0 - specular_probability) * warp::cosine_hemisphere_pdf(cos_i);
-        if specular_probability > 0.0 {
+        if built_in::GLOSSY && specular_probability > 0.0 {
             let h = (self.wo + wi).normalize_or(Vec3::Z);
             let schlick = (1.0 - self.wo.dot(h)).clamp(0.0, 1.0).powi(5);
             let shape =
