@@ -17,7 +17,6 @@
 //! eight lanes of a group together.
 
 use super::viewer::Receiver;
-use crate::math::built_in;
 use glam::Vec3;
 
 /// A box is called below the horizon only if it is lower by more than this share of its distance and
@@ -108,12 +107,11 @@ impl Cluster {
     /// The share of light that the range leaves at a squared distance, m^2; 0 only surely out of range.
     #[inline(always)]
     pub fn window(&self, nearest2: f32) -> f32 {
-        if !built_in::RANGE {
-            return 1.0;
-        }
         let ratio2 = nearest2 * self.inverse_range2;
         let window = (1.0 - ratio2 * ratio2).max(FLOOR);
-        if ratio2 > 1.0 + RANGE_SLACK { 0.0 } else { window }
+        let window = if ratio2 > 1.0 + RANGE_SLACK { 0.0 } else { window };
+        // Where it is known while compiling that there is no range, nothing else is left of this.
+        if self.inverse_range2 == 0.0 { 1.0 } else { window }
     }
 }
 

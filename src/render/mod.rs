@@ -52,6 +52,7 @@ pub mod surface;
 pub use crop::{CropError, Window};
 pub use delegate::{FrameStats, Progress, RenderDelegate, RenderError, RenderedFrame};
 pub use layers::Aov;
-pub use light_groups::{LightGroupError, LightGroupRule};
+pub use light_groups::{LightGroupError, LightGroupRule, LightGroups};
 pub use plan::PlanError;
+pub use rays::kept_in_own_space;
 pub use settings::{LightStrategy, RenderSettings, SplitBy};

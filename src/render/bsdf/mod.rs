@@ -111,6 +111,12 @@ impl Bsdf {
         }
     }
 
+    /// Whether it has a specular lobe. Without one it is Lambertian.
+    fn is_glossy(&self) -> bool {
+        let is_coated = self.dielectric_f90 > 0.0 || self.dielectric_f0 != Rgb::ZERO;
+        built_in::GLOSSY && (is_coated || self.metallic > 0.0)
+    }
+
     /// Towards `wo`.
     pub fn toward(&self, wo: Vec3) -> Reflection {
         let wo = self.frame.to_local(wo);
@@ -124,6 +130,12 @@ impl Bsdf {
             specular_probability: None,
         };
         if wo.z <= 0.0 {
+            return reflection;
+        }
+        if !self.is_glossy() {
+            // Without a look at the albedos: their table costs a process tens of milliseconds.
+            reflection.diffuse = self.diffuse;
+            reflection.specular_probability = (self.diffuse != Rgb::ZERO).then_some(0.0);
             return reflection;
         }
         let whole = 1.0 - self.metallic;
@@ -186,6 +198,9 @@ impl Reflection {
     pub fn albedo(&self) -> (Rgb, Rgb) {
         if self.specular_probability.is_none() {
             return (Rgb::ZERO, Rgb::ZERO);
+        }
+        if !built_in::GLOSSY || (self.at_normal, self.toward_grazing) == (Rgb::ZERO, Rgb::ZERO) {
+            return (Rgb::ZERO, self.diffuse / FRAC_1_PI);
         }
         let part = Albedo::of_ggx(self.wo.z, self.alpha);
         let specular = self.at_normal * (part.a + part.b) + self.toward_grazing * part.b;
