@@ -151,7 +151,7 @@ fn surfaces(scene: &Scene, needs: &Requirements, emitters: &Emitters) -> Vec<Fea
             )
             .taking(texels),
         Feature::new("texture coordinates", coordinates(scene))
-            .used_by(users, "in memory", "nothing looks them up; in memory all the same")
+            .with("in memory")
             .taking(coordinates(scene) * size_of::<Vec2>()),
         Feature::new("normal maps", needs.normal_maps),
         Feature::new("cut-out materials", needs.cutouts).with("rays ask at every hit on one"),

@@ -118,6 +118,15 @@ fn what_a_scene_lacks_is_off_and_costs_nothing() {
 }
 
 #[test]
+fn the_tree_of_a_plain_scene_has_no_section_for_what_it_lacks() {
+    let report = json_of(&lamps(8), "inspect shot.ltree --json");
+    let mut ids: Vec<&str> =
+        report["sections"].as_array().unwrap().iter().map(|s| s["id"].as_str().unwrap()).collect();
+    ids.sort();
+    assert_eq!(ids, ["GRUP", "LGHT", "META", "PATH", "TREE"]);
+}
+
+#[test]
 fn textures_that_no_light_uses_are_not_baked() {
     let shot = Shot::still().with_picture_file();
     let report = json_of(&shot, &format!("inspect {SCENE} --json"));
@@ -144,7 +153,11 @@ fn a_texture_on_a_light_is_baked_into_as_many_bytes_as_the_report_says() {
 #[test]
 fn a_texture_that_nothing_uses_is_off() {
     let mut shot = Shot::still().with_picture_file();
-    shot.edit(|json| json["materials"][0]["pbrMetallicRoughness"] = json!({"metallicFactor": 0}));
+    shot.edit(|json| {
+        json["materials"][0]["pbrMetallicRoughness"] = json!({"metallicFactor": 0});
+        // The wall does not emit.
+        json["materials"][0]["emissiveTexture"] = json!({"index": 0});
+    });
     let report = json_of(&shot, &format!("inspect {SCENE} --json"));
     assert!(
         matches!(feature(&report, "textures"), (0 | 1, state, None) if state == "off"),
