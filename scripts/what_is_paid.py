@@ -1,8 +1,9 @@
 """What a scene pays for features that it does not use, as a table in Markdown.
 
-For each feature the renderer is built a second time without it (Cargo's `without-NAME`, src/math/built_in.rs). Both
-programs render one scene that has none of the features, one process after the other, on one thread. The table has
-the whole program's cost over that of the program without the feature:
+For each feature the renderer is built a second time without it (Cargo's `without-NAME`, src/math/built_in.rs), and
+once without any. Both programs render one scene that has none of the features, one process after the other, on one
+thread: with the default knob, or with one light at a point where splitting is what is left out. The table has the
+whole program's cost over that of the program without the feature:
 
     instructions  of the samples alone: of a process with many samples less one with few
     process       instructions of the whole process, with reading the scene and building its tree
@@ -11,7 +12,7 @@ the whole program's cost over that of the program without the feature:
 
 Instructions are counted by `perf`, or by Valgrind's cachegrind where the kernel gives no counters; they hardly depend
 on what else the machine does, wall times do. The two programs must write the same picture. Fails if a count of
-instructions or bytes is more than 2 % above.
+instructions or bytes is more than 2 % above, for any one feature.
 
     python3 scripts/what_is_paid.py [--quick] [--json FILE] [--programs FOLDER] [FEATURE ...]
 """
@@ -34,6 +35,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 FEATURES = ("textures", "fog", "motion", "domes", "instances", "splitting", "range", "glossy")
+ALL = "all"
 ALLOWED = 1.02
 FLOOR, FACES, POINTS = 48, 3000, 1000
 FEW, MANY = 1, 9
@@ -100,7 +102,9 @@ def built(feature, folder):
     program = folder / (feature or "whole")
     if not program.exists():
         command = ["cargo", "build", "--release", "--quiet", "--bin", "candelabra-render"]
-        subprocess.run(command + (["--features", f"without-{feature}"] if feature else []), cwd=ROOT, check=True)
+        without = FEATURES if feature == ALL else [feature] if feature else []
+        command += ["--features", ",".join(f"without-{name}" for name in without)]
+        subprocess.run(command, cwd=ROOT, check=True)
         target = Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target"))
         folder.mkdir(parents=True, exist_ok=True)
         shutil.copy2(target / "release" / "candelabra-render", program)
@@ -119,7 +123,7 @@ class Shot:
         self.runs = 5 if options.quick else 15
 
     def command(self, program, feature, samples, size=None):
-        split = ["--split", "0"] if feature == "splitting" else []
+        split = ["--split", "0"] if feature in ("splitting", ALL) else []
         size = ["--res", size or self.size, "--spp", str(samples), "--depth", "3", "--threads", "1"]
         return [program, self.folder / "shot.gltf", "-o", self.folder / "a.exr", "--progress", "none", *size, *split]
 
@@ -146,8 +150,13 @@ class Shot:
             sys.exit(f"failed: {' '.join(map(str, command))}")
         return time.monotonic() - started, usage.ru_maxrss
 
-    def picture(self):
-        return hashlib.sha256((self.folder / "a.exr").read_bytes()).hexdigest()
+    def pixels(self):
+        """A hash of what is behind the picture's header, in which the program has left its own hash."""
+        data, at = (self.folder / "a.exr").read_bytes(), 8
+        while data[at]:
+            at = data.index(b"\0", data.index(b"\0", at) + 1) + 1
+            at += 4 + struct.unpack_from("<I", data, at)[0]
+        return hashlib.sha256(data[at:]).hexdigest()
 
 
 def measure(shot, whole, without, feature):
@@ -156,7 +165,7 @@ def measure(shot, whole, without, feature):
     for name, program in (("whole", whole), ("without", without)):
         few, many = (shot.instructions(program, feature, samples) for samples in (FEW, MANY))
         counts[name] = (many - few, many)
-        pictures.add(shot.picture())
+        pictures.add(shot.pixels())
     if len(pictures) > 1:
         sys.exit(f"without {feature} the picture is another")
     costs = {"whole": [], "without": []}
@@ -177,27 +186,29 @@ def measure(shot, whole, without, feature):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("features", nargs="*", metavar="FEATURE", help=f"of {', '.join(FEATURES)}; all if none")
+    parser.add_argument("features", nargs="*", metavar="FEATURE", help=f"of {', '.join(FEATURES)} and {ALL}, which is without any; each if none")
     parser.add_argument("--quick", action="store_true", help="fewer pixels and runs")
     parser.add_argument("--json", type=Path, help="write the numbers to a file, too")
     parser.add_argument("--programs", type=Path, default=ROOT / "target" / "paid", help="where the programs are kept")
     options = parser.parse_args()
-    if unknown := [name for name in options.features if name not in FEATURES]:
-        parser.error(f"no feature {', '.join(unknown)}; choose of {', '.join(FEATURES)}")
+    if unknown := [name for name in options.features if name not in (*FEATURES, ALL)]:
+        parser.error(f"no feature {', '.join(unknown)}; choose of {', '.join(FEATURES)} and {ALL}")
     rows = []
     columns = ("instructions", "process", "time", "memory")
     print(f"| a scene without | {' | '.join(columns)} |\n|---|---|---|---|---|")
     with tempfile.TemporaryDirectory() as folder:
         shot = Shot(Path(folder), options)
         whole = built(None, options.programs)
-        for feature in options.features or FEATURES:
+        for feature in options.features or (*FEATURES, ALL):
             row = measure(shot, whole, built(feature, options.programs), feature)
             rows.append(row)
             print(f"| {feature} | {' | '.join(f'{row[column]:.3f}' for column in columns)} |", flush=True)
     if options.json:
         options.json.write_text(json.dumps(rows, indent=1) + "\n")
-    if paid := [row["feature"] for row in rows for column in ("instructions", "process", "memory") if row[column] > ALLOWED]:
-        sys.exit(f"more than {100 * (ALLOWED - 1):.0f} % is paid for what is not used: {', '.join(dict.fromkeys(paid))}")
+    counted = ("instructions", "process", "memory")
+    one = [row for row in rows if row["feature"] != ALL]
+    if paid := [row["feature"] for row in one if any(row[column] > ALLOWED for column in counted)]:
+        sys.exit(f"more than {100 * (ALLOWED - 1):.0f} % is paid for what is not used: {', '.join(paid)}")
 
 
 if __name__ == "__main__":
