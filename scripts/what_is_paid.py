@@ -12,7 +12,7 @@ whole program's cost over that of the program without the feature:
 
 Instructions are counted by `perf`, or by Valgrind's cachegrind where the kernel gives no counters; they hardly depend
 on what else the machine does, wall times do. The two programs must write the same picture. Fails if a count of
-instructions or bytes is more than 2 % above, for any one feature.
+instructions or bytes is more than 2 % above, for any one feature (exit code 3).
 
     python3 scripts/what_is_paid.py [--quick] [--json FILE] [--programs FOLDER] [FEATURE ...]
 """
@@ -208,7 +208,8 @@ def main():
     counted = ("instructions", "process", "memory")
     one = [row for row in rows if row["feature"] != ALL]
     if paid := [row["feature"] for row in one if any(row[column] > ALLOWED for column in counted)]:
-        sys.exit(f"more than {100 * (ALLOWED - 1):.0f} % is paid for what is not used: {', '.join(paid)}")
+        print(f"more than {100 * (ALLOWED - 1):.0f} % is paid for what is not used: {', '.join(paid)}", file=sys.stderr)
+        sys.exit(3)
 
 
 if __name__ == "__main__":
