@@ -98,16 +98,17 @@ def scene():
 
 
 def built(feature, folder):
-    """The renderer without a feature, or with all of them."""
-    program = folder / (feature or "whole")
-    if not program.exists():
-        command = ["cargo", "build", "--release", "--quiet", "--bin", "candelabra-render"]
-        without = FEATURES if feature == ALL else [feature] if feature else []
-        command += ["--features", ",".join(f"without-{name}" for name in without)]
-        subprocess.run(command, cwd=ROOT, check=True)
-        target = Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target"))
-        folder.mkdir(parents=True, exist_ok=True)
-        shutil.copy2(target / "release" / "candelabra-render", program)
+    """The renderer without a feature, or with all of them: from a folder, or built of the sources as they are."""
+    if folder:
+        return folder / (feature or "whole")
+    command = ["cargo", "build", "--release", "--quiet", "--bin", "candelabra-render"]
+    without = FEATURES if feature == ALL else [feature] if feature else []
+    command += ["--features", ",".join(f"without-{name}" for name in without)]
+    subprocess.run(command, cwd=ROOT, check=True)
+    target = Path(os.environ.get("CARGO_TARGET_DIR", ROOT / "target"))
+    program = target / "paid" / (feature or "whole")
+    program.parent.mkdir(parents=True, exist_ok=True)
+    shutil.copy2(target / "release" / "candelabra-render", program)
     return program
 
 
@@ -189,7 +190,7 @@ def main():
     parser.add_argument("features", nargs="*", metavar="FEATURE", help=f"of {', '.join(FEATURES)} and {ALL}, which is without any; each if none")
     parser.add_argument("--quick", action="store_true", help="fewer pixels and runs")
     parser.add_argument("--json", type=Path, help="write the numbers to a file, too")
-    parser.add_argument("--programs", type=Path, default=ROOT / "target" / "paid", help="where the programs are kept")
+    parser.add_argument("--programs", type=Path, help="a folder of programs built before: whole, and one for each feature")
     options = parser.parse_args()
     if unknown := [name for name in options.features if name not in (*FEATURES, ALL)]:
         parser.error(f"no feature {', '.join(unknown)}; choose of {', '.join(FEATURES)} and {ALL}")
