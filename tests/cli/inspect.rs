@@ -192,7 +192,7 @@ fn light_groups_are_listed_with_their_lights() {
     let mut shot = lamps(3);
     shot.edit(|json| {
         for node in json["nodes"].as_array_mut().unwrap().iter_mut().rev().take(2) {
-            node["extras"] = json!({"usdLux": {"group": "key"}});
+            node["extras"] = json!({"usdLux": {"type": "SphereLight", "group": "key"}});
         }
     });
     let report = json_of(&shot, &format!("inspect {SCENE} --json"));
