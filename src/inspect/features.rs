@@ -136,7 +136,12 @@ fn surfaces(scene: &Scene, needs: &Requirements, emitters: &Emitters) -> Vec<Fea
     let textured = scene.materials.iter().filter(|material| is_textured(material)).count();
     let on_emitters = emitters.texture_means().len() + needs.pictured_domes;
     let users = textured + on_emitters;
-    let kept = kept_in_own_space(scene).into_iter().filter(|&kept| kept).count();
+    let kept = kept_in_own_space(scene);
+    let mut kept_users = vec![0usize; scene.meshes.len()];
+    for (instance, _) in scene.instances.iter().zip(kept).filter(|&(_, is_kept)| is_kept) {
+        kept_users[instance.mesh as usize] += 1;
+    }
+    let kept_shared = kept_users.into_iter().filter(|&users| users > 1).count();
     let texels: usize = scene.textures.iter().map(|texture| Texture::bytes(texture).len()).sum();
     vec![
         Feature::new("textures", needs.textures)
@@ -158,9 +163,9 @@ fn surfaces(scene: &Scene, needs: &Requirements, emitters: &Emitters) -> Vec<Fea
         Feature::new("glossy materials", needs.glossy)
             .with("their lobes are part of the importance"),
         Feature::new("meshes shared by instances", needs.shared_meshes).used_by(
-            kept,
-            "rays search one set of triangles in its own space",
-            "too small: rays search copies",
+            kept_shared,
+            "of those that are large, rays search one set of triangles in its own space",
+            "small: rays search copies in world space",
         ),
         Feature::new("fog", needs.fog).with("every stretch of a path picks lights"),
     ]

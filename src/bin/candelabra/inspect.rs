@@ -119,12 +119,12 @@ fn print_scene(out: &mut impl Write, report: &SceneReport) -> Result<()> {
         "  emitters    {} of {} lights; {} change",
         report.emitters, report.lights, report.changing
     )?;
-    writeln!(out, "  {:>10}  {:<30}  {:<8}  {:>12}", "found", "feature", "is", "bytes")?;
+    writeln!(out, "  {:>10}  {:<31}  {:<8}  {:>12}", "found", "feature", "is", "bytes")?;
     for feature in &report.features {
         let (name, state) = (feature.name, feature.state.word());
         let bytes = feature.bytes.map_or(String::new(), |bytes| bytes.to_string());
         let note = feature.note.unwrap_or_default();
-        let line = format!("  {:>10}  {name:<30}  {state:<8}  {bytes:>12}  {note}", feature.found);
+        let line = format!("  {:>10}  {name:<31}  {state:<8}  {bytes:>12}  {note}", feature.found);
         writeln!(out, "{}", line.trim_end())?;
     }
     for group in &report.light_groups {
