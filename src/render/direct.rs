@@ -1,9 +1,9 @@
 //! Next-event estimation: light from the lights that are picked for a point of a surface.
 
-use super::path::{Integrator, PathScratch, Vertex};
-use super::picker::{LightPick, Wanted};
+use super::path::{Integrator, PathScratch, TraceStats, Vertex};
+use super::picker::{LightPick, PickScratch, Wanted};
 use super::rays::Anchor;
-use crate::light_tree::Picked;
+use crate::light_tree::{Picked, Splitting};
 use crate::math::color::Rgb;
 use crate::math::random::hash;
 use glam::{Vec2, Vec3};
@@ -25,21 +25,49 @@ pub struct Incoming {
 impl Integrator<'_> {
     /// What a vertex reflects of the lights that are picked for it. `u_pick` picks the lights, `u` samples
     /// points on them, and `salt` is a hash of the pixel and the bounce. `throughput` is the share of the
-    /// reflected light that gets to the eye: for the light groups alone, the result is without it.
+    /// reflected light that gets to the eye: the result is without it.
     pub(super) fn direct(
         &self,
         vertex: &Vertex,
         wanted: &Wanted,
-        (u_pick, u, salt): (f32, Vec2, u32),
+        numbers: (f32, Vec2, u32),
         accept: &impl Fn(u32, u32, Vec2) -> bool,
-        throughput: Rgb,
+        (bounce, throughput): (u32, Rgb),
         scratch: &mut PathScratch,
     ) -> Rgb {
         let mut sum = Rgb::ZERO;
-        let PathScratch { picks, stats, by_group, .. } = scratch;
-        let several = self.picker.takes_several();
-        self.picker.pick(wanted, u_pick, salt, picks, |pick| {
+        let PathScratch { picks, stats, by_group, trial, .. } = scratch;
+        let how = self.picker.splitting(bounce);
+        self.gather(vertex, (wanted, how), numbers, accept, (picks, stats), |light, reflected| {
+            self.count_in_group(light, throughput * reflected, by_group);
+            sum += reflected;
+        });
+        if let Some(trial) = trial {
+            trial.at(bounce, throughput, |how, ([pick, u, v, _], salt), stats| {
+                let (numbers, room) = ((pick, Vec2::new(u, v), salt), (&mut *picks, stats));
+                let mut sum = Rgb::ZERO;
+                self.gather(vertex, (wanted, how), numbers, accept, room, |_, light| sum += light);
+                sum
+            });
+        }
+        sum
+    }
+
+    /// Picks lights for a vertex and calls `visit` with each and what the vertex reflects of it.
+    fn gather(
+        &self,
+        vertex: &Vertex,
+        (wanted, how): (&Wanted, &Splitting),
+        (u_pick, u, salt): (f32, Vec2, u32),
+        accept: &impl Fn(u32, u32, Vec2) -> bool,
+        (picks, stats): (&mut PickScratch, &mut TraceStats),
+        mut visit: impl FnMut(Picked, Rgb),
+    ) {
+        let several = self.picker.takes_several(how);
+        let weighed = picks.weighed();
+        self.picker.pick(wanted, how, (u_pick, salt), picks, |pick| {
             stats.light_picks += 1;
+            stats.groups += u64::from(pick.weighed);
             let u = if several { another(u, salt, pick.light) } else { u };
             let incoming =
                 self.incoming(pick.light, vertex.receiver.point, vertex.receiver.normal, u);
@@ -49,11 +77,10 @@ impl Integrator<'_> {
                 return;
             }
             stats.rays += 1;
-            let light = reflected * self.arriving(&vertex.anchor, &incoming, accept);
-            self.count_in_group(pick.light, throughput * light, by_group);
-            sum += light;
+            stats.shadow_rays += 1;
+            visit(pick.light, reflected * self.arriving(&vertex.anchor, &incoming, accept));
         });
-        sum
+        stats.groups += picks.weighed() - weighed;
     }
 
     /// What a vertex reflects of some light if nothing blocks it, divided by the probability and pdf of

@@ -10,6 +10,7 @@
 //! | [`path`] | how does light get from a lamp to the eye? |
 //! | [`direct`], [`fog`] | what do picked lights give a surface, what a stretch of fog? |
 //! | [`picker`] | which lights are sampled there, and how often is each expected to be? |
+//! | [`knob`] | how readily are clusters split, if nobody says? |
 //! | [`camera`] | which ray belongs to a point of the picture? |
 //! | [`rays`] | what does a ray hit, and is a light visible? |
 //! | [`surface`] | what is there: normals, textures, material? |
@@ -35,6 +36,7 @@ mod exr_header;
 pub mod fog;
 pub mod frame_names;
 pub mod frames;
+pub mod knob;
 pub mod layers;
 pub mod light_groups;
 mod motion;
@@ -51,6 +53,7 @@ pub mod surface;
 
 pub use crop::{CropError, Window};
 pub use delegate::{FrameStats, Progress, RenderDelegate, RenderError, RenderedFrame};
+pub use knob::{Knobs, Split};
 pub use layers::Aov;
 pub use light_groups::{LightGroupError, LightGroupRule};
 pub use plan::PlanError;
