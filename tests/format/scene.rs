@@ -9,7 +9,7 @@ use candelabra::pipeline::{
     self, OpenedTree, ShotTrees, Standing, TreeError, TreeFile, check_fresh, collect_emitters,
     rebuild_tree, standing,
 };
-use candelabra::render::{LightStrategy, RenderDelegate, RenderSettings};
+use candelabra::render::{LightStrategy, RenderDelegate, RenderSettings, Split};
 use candelabra::scene::Scene;
 use candelabra::store::AlignedBytes;
 use glam::Vec3;

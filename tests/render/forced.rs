@@ -8,7 +8,7 @@ use crate::statistics::pixels;
 use crate::strategies::{Way, disagreement, render};
 use candelabra::light_tree::{Picked, Receiver, Scratch, Splitting, TreeKind};
 use candelabra::pipeline::{NoLightThere, force_lights};
-use candelabra::render::{LightStrategy, RenderDelegate, RenderSettings};
+use candelabra::render::{LightStrategy, RenderDelegate, RenderSettings, Split};
 use candelabra::scene::{LightKind, Node, Scene};
 use glam::{DVec3, Vec3};
 use std::f64::consts::PI;

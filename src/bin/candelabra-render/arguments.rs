@@ -4,7 +4,9 @@ use crate::display::Progress;
 use candelabra::pipeline::{Preview, RenderJob, Strict, View, option};
 use candelabra::render::frame_names::FrameNames;
 use candelabra::render::frames::Frames;
-use candelabra::render::{Aov, LightGroupRule, LightStrategy, RenderSettings, SplitBy, Window};
+use candelabra::render::{
+    Aov, LightGroupRule, LightStrategy, RenderSettings, Split, SplitBy, Window,
+};
 use candelabra::scene::Medium;
 use clap::{Parser, ValueEnum};
 use std::path::PathBuf;

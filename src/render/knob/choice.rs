@@ -131,8 +131,8 @@ fn steps(tried: &[Option<Tried>; KNOBS.len()], whole: f64, usual: f32, handicap:
     for pair in known.windows(2) {
         let [(from, v0, c0), (to, v1, c1)] = [pair[0], pair[1]];
         // Between no splitting at all and a little, there is nothing.
-        let between = if from == 0 { STEPS..STEPS } else { 1..STEPS };
-        steps.extend(between.filter(|&step| step < STEPS).map(|step| {
+        let between = if from == 0 { 0..0 } else { 1..STEPS };
+        steps.extend(between.map(|step| {
             let t = step as f64 / STEPS as f64;
             let mixed = |a: f64, b: f64| a * (b / a).powf(t);
             let ease = readiness(KNOBS[from]) * (1.0 - t) + readiness(KNOBS[to]) * t;
