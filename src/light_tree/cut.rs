@@ -50,12 +50,15 @@ pub struct Scratch<V> {
     pub(super) low: Vec<f64>,
     pub(super) high: Vec<f64>,
     open: Vec<Opened<V>>,
+    /// Groups weighed since it was made: what picking costs.
+    pub weighed: u64,
 }
 
 impl<V> Default for Scratch<V> {
     fn default() -> Self {
         let (weights, caps, low, high) = Default::default();
-        Scratch { entries: Vec::new(), weights, caps, low, high, open: Vec::new() }
+        let (entries, open) = Default::default();
+        Scratch { entries, weights, caps, low, high, open, weighed: 0 }
     }
 }
 
@@ -165,6 +168,7 @@ impl FrameTree<'_> {
             let Some(Weighed { group, importances, spreads }) = self.weigh(&place) else {
                 continue;
             };
+            scratch.weighed += 1;
             let sum: f64 = importances.iter().sum();
             if !(sum > 0.0 && sum.is_finite()) {
                 continue;

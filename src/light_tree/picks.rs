@@ -47,7 +47,9 @@ impl FrameTree<'_> {
         let expected = cut.expected(scratch, entry);
         let probability = cut.divisor(scratch, entry, chance);
         match scratch.entries[entry] {
-            Entry::Light(light) => Some(Pick { light, probability, expected, leftover: u }),
+            Entry::Light(light) => {
+                Some(Pick { light, probability, expected, leftover: u, weighed: 0 })
+            }
             Entry::Cluster(place) => {
                 let pick = self.descend(place, u)?;
                 Some(Pick {

@@ -28,6 +28,8 @@ pub struct Pick {
     pub expected: f64,
     /// The rest of the random number: uniform in `[0, 1)` and independent of the pick.
     pub leftover: f64,
+    /// Groups that the descent weighed.
+    pub weighed: u32,
 }
 
 /// The tree of one frame, ready to be sampled.
@@ -100,9 +102,10 @@ impl FrameTree<'_> {
     }
 
     pub(super) fn descend<V: Viewer>(&self, mut place: Place<V>, mut u: f64) -> Option<Pick> {
-        let mut probability = 1.0;
+        let (mut probability, mut weighed) = (1.0, 0);
         loop {
             let choice = self.weigh(&place)?.choice()?;
+            weighed += 1;
             let (lane, leftover) = choice.choose(u);
             u = leftover;
             probability *= choice.share(lane);
@@ -110,7 +113,8 @@ impl FrameTree<'_> {
                 Next::Group(next) => place = next,
                 Next::Emitter(emitter) => {
                     let light = Picked::Emitter(emitter);
-                    return Some(Pick { light, probability, expected: probability, leftover: u });
+                    let expected = probability;
+                    return Some(Pick { light, probability, expected, leftover: u, weighed });
                 }
             }
         }

@@ -11,7 +11,7 @@ use crate::light_tree::{LightTree, NoSuchFrame};
 use crate::math::random::{Sampler, hash};
 use crate::render::path::{Integrator, Vertex};
 use crate::render::picker::{LightPicker, PickScratch, Wanted};
-use crate::render::{LightStrategy, RenderDelegate, RenderSettings, SplitBy};
+use crate::render::{LightStrategy, RenderDelegate, RenderSettings, Split, SplitBy};
 use rayon::prelude::*;
 use serde::Serialize;
 use std::time::Instant;
@@ -104,10 +104,10 @@ fn report(integrator: &Integrator, options: &ProbeOptions) -> ProbeReport {
     }
     ways.push((LightStrategy::Exhaustive, 0.0, SplitBy::Variance));
     ways.push((LightStrategy::All, 0.0, SplitBy::Variance));
-    let strategies = ways.into_iter().map(|(strategy, split, split_by)| {
+    let strategies = ways.into_iter().map(|(strategy, knob, split_by)| {
         let settings = RenderSettings {
             strategy,
-            split,
+            split: Split::Fixed(knob),
             split_by,
             max_lights: options.max_lights,
             ..integrator.settings.clone()
@@ -149,7 +149,7 @@ fn of_strategy(
 ) -> StrategyReport {
     let tree = integrator.picker.tree().clone();
     let picker = LightPicker::new(settings, tree, integrator.infinite);
-    let splitting = settings.splitting();
+    let splitting = settings.splitting(0);
     let rows: Vec<(f64, f64)> = probes
         .par_iter()
         .map(|probe| {
@@ -168,7 +168,7 @@ fn of_strategy(
     };
     StrategyReport {
         strategy: settings.strategy,
-        split: splits.then_some(settings.split),
+        split: splits.then_some(splitting.knob),
         split_by: splits.then_some(settings.split_by),
         relative_variance: mean(|row| row.0),
         median: quantile(0.5),
@@ -186,8 +186,9 @@ fn of_probe(picker: &LightPicker, strategy: LightStrategy, probe: &Probe) -> (f6
     match strategy {
         LightStrategy::All => (0.0, f64::from(picker.count())),
         LightStrategy::Tree | LightStrategy::Distance => {
-            let moments =
-                picker.moments(wanted, &|light, expected| probe.contributions.of(light, expected));
+            let moments = picker.moments(wanted, picker.splitting(0), &|light, expected| {
+                probe.contributions.of(light, expected)
+            });
             (moments.variance, moments.lights)
         }
         LightStrategy::Exhaustive => {
@@ -216,7 +217,9 @@ fn nanoseconds(picker: &LightPicker, probes: &[Probe]) -> f64 {
             let mut picked = 0u32;
             for (number, probe) in (0..).zip(probes) {
                 let u = (hash(round, number) >> 8) as f32 / 16_777_216.0;
-                picker.pick(&probe.wanted, u, number, &mut scratch, |_| picked += 1);
+                picker.pick(&probe.wanted, picker.splitting(0), (u, number), &mut scratch, |_| {
+                    picked += 1
+                });
             }
             std::hint::black_box(picked);
             started.elapsed().as_nanos() as f64 / probes.len().max(1) as f64

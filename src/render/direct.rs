@@ -1,9 +1,9 @@
 //! Next-event estimation: light from the lights that are picked for a point of a surface.
 
-use super::path::{Integrator, PathScratch, Vertex};
-use super::picker::{LightPick, Wanted};
+use super::path::{Integrator, PathScratch, TraceStats, Vertex};
+use super::picker::{LightPick, PickScratch, Wanted};
 use super::rays::Anchor;
-use crate::light_tree::Picked;
+use crate::light_tree::{Picked, Splitting};
 use crate::math::built_in;
 use crate::math::color::{Rgb, luminance};
 use crate::math::random::hash;
@@ -26,21 +26,57 @@ pub struct Incoming {
 impl Integrator<'_> {
     /// What a vertex reflects of the lights that are picked for it. `u_pick` picks the lights, `u` samples
     /// points on them, and `salt` is a hash of the pixel and the bounce. `throughput` is the share of the
-    /// reflected light that gets to the eye: for light groups and blocked light, the result is without it.
+    /// reflected light that gets to the eye: the result is without it.
     pub(super) fn direct(
         &self,
         vertex: &Vertex,
         wanted: &Wanted,
-        (u_pick, u, salt): (f32, Vec2, u32),
+        numbers: (f32, Vec2, u32),
         accept: &impl Fn(u32, u32, Vec2) -> bool,
-        throughput: Rgb,
+        (bounce, throughput): (u32, Rgb),
         scratch: &mut PathScratch,
     ) -> Rgb {
         let mut sum = Rgb::ZERO;
-        let PathScratch { picks, stats, by_group, blocked, .. } = scratch;
-        let several = self.picker.takes_several();
-        self.picker.pick(wanted, u_pick, salt, picks, |pick| {
+        let PathScratch { picks, stats, by_group, blocked, trial, .. } = scratch;
+        let how = self.picker.splitting(bounce);
+        let room = (&mut *picks, stats);
+        self.gather(vertex, (wanted, how), numbers, accept, room, |light, whole, arriving| {
+            if arriving == Rgb::ZERO {
+                *blocked += f64::from(luminance(throughput * whole)).powi(2);
+                return;
+            }
+            self.count_in_group(light, throughput * whole * arriving, by_group);
+            sum += whole * arriving;
+        });
+        if let Some(trial) = trial {
+            trial.at(bounce, throughput, |how, ([pick, u, v, _], salt), stats| {
+                let (numbers, room) = ((pick, Vec2::new(u, v), salt), (&mut *picks, stats));
+                let mut sum = Rgb::ZERO;
+                self.gather(vertex, (wanted, how), numbers, accept, room, |_, whole, arriving| {
+                    sum += whole * arriving;
+                });
+                sum
+            });
+        }
+        sum
+    }
+
+    /// Picks lights for a vertex and calls `visit` with each, what the vertex reflects of it if nothing
+    /// blocks it, and the share that arrives.
+    fn gather(
+        &self,
+        vertex: &Vertex,
+        (wanted, how): (&Wanted, &Splitting),
+        (u_pick, u, salt): (f32, Vec2, u32),
+        accept: &impl Fn(u32, u32, Vec2) -> bool,
+        (picks, stats): (&mut PickScratch, &mut TraceStats),
+        mut visit: impl FnMut(Picked, Rgb, Rgb),
+    ) {
+        let several = self.picker.takes_several(how);
+        let weighed = picks.weighed();
+        self.picker.pick(wanted, how, (u_pick, salt), picks, |pick| {
             stats.light_picks += 1;
+            stats.groups += u64::from(pick.weighed);
             let u = if several { another(u, salt, pick.light) } else { u };
             let incoming =
                 self.incoming(pick.light, vertex.receiver.point, vertex.receiver.normal, u);
@@ -50,16 +86,10 @@ impl Integrator<'_> {
                 return;
             }
             stats.rays += 1;
-            let arriving = self.arriving(&vertex.anchor, &incoming, accept);
-            if arriving == Rgb::ZERO {
-                *blocked += f64::from(luminance(throughput * reflected)).powi(2);
-                return;
-            }
-            let light = reflected * arriving;
-            self.count_in_group(pick.light, throughput * light, by_group);
-            sum += light;
+            stats.shadow_rays += 1;
+            visit(pick.light, reflected, self.arriving(&vertex.anchor, &incoming, accept));
         });
-        sum
+        stats.groups += picks.weighed() - weighed;
     }
 
     /// What a vertex reflects of some light if nothing blocks it, divided by the probability and pdf of

@@ -14,10 +14,10 @@
 //! A beam a millimetre wide is therefore hit from kilometres away.
 
 use super::direct::another;
-use super::path::{Integrator, PathScratch};
-use super::picker::Wanted;
+use super::path::{Integrator, PathScratch, TraceStats};
+use super::picker::{PickScratch, Wanted};
 use super::rays::Anchor;
-use crate::light_tree::{Picked, Segment};
+use crate::light_tree::{Picked, Segment, Splitting};
 use crate::math::color::{Rgb, luminance};
 use crate::scene::{Camera, Medium, Pose, Scene};
 use glam::{DAffine3, DVec3, Vec2, Vec3};
@@ -170,14 +170,14 @@ impl Integrator<'_> {
     }
 
     /// Light that the fog along a stretch of a ray scatters, once, towards the ray's origin. `throughput`
-    /// is the share of it that gets to the eye: for the light groups alone, the result is without it.
+    /// is the share of it that gets to the eye: the result is without it.
     pub(super) fn scattered(
         &self,
         fog: &Fog,
         (origin, direction, length): (Vec3, Vec3, f32),
-        ([u_pick, u_place, lu, lv], salt): ([f32; 4], u32),
+        numbers: ([f32; 4], u32),
         accept: &impl Fn(u32, u32, Vec2) -> bool,
-        throughput: Rgb,
+        (bounce, throughput): (u32, Rgb),
         scratch: &mut PathScratch,
     ) -> Rgb {
         let whole = stretch(origin, direction, length);
@@ -189,12 +189,57 @@ impl Integrator<'_> {
         let segment = Segment { origin, direction, length };
         let wanted = Wanted::Along(segment, (lost / extinction) as f32);
         let mut sum = Rgb::ZERO;
-        let PathScratch { picks, stats, by_group, blocked, .. } = scratch;
-        self.picker.pick(&wanted, u_pick, salt, picks, |pick| {
+        let PathScratch { picks, stats, by_group, blocked, trial, .. } = scratch;
+        let how = self.picker.splitting(bounce);
+        let part = (fog, &stretch);
+        self.gather_along(
+            part,
+            (&wanted, how),
+            numbers,
+            accept,
+            (picks, stats),
+            |light, whole, arriving| {
+                if arriving == Rgb::ZERO {
+                    *blocked += f64::from(luminance(throughput * whole)).powi(2);
+                    return;
+                }
+                self.count_in_group(light, throughput * whole * arriving, by_group);
+                sum += whole * arriving;
+            },
+        );
+        if let Some(trial) = trial {
+            trial.at(bounce, throughput, |how, numbers, stats| {
+                let (wanted, room) = ((&wanted, how), (&mut *picks, stats));
+                let mut sum = Rgb::ZERO;
+                self.gather_along(part, wanted, numbers, accept, room, |_, whole, arriving| {
+                    sum += whole * arriving;
+                });
+                sum
+            });
+        }
+        sum
+    }
+
+    /// Picks lights for a stretch inside the fog and calls `visit` with each, what is scattered of
+    /// it if nothing blocks it, and the share that arrives.
+    fn gather_along(
+        &self,
+        (fog, stretch): (&Fog, &Stretch),
+        (wanted, how): (&Wanted, &Splitting),
+        ([u_pick, u_place, lu, lv], salt): ([f32; 4], u32),
+        accept: &impl Fn(u32, u32, Vec2) -> bool,
+        (picks, stats): (&mut PickScratch, &mut TraceStats),
+        mut visit: impl FnMut(Picked, Rgb, Rgb),
+    ) {
+        let direction = stretch.direction.as_vec3();
+        let extinction = f64::from(luminance(fog.extinction).max(f32::MIN_POSITIVE));
+        let weighed = picks.weighed();
+        self.picker.pick(wanted, how, (u_pick, salt), picks, |pick| {
             stats.light_picks += 1;
+            stats.groups += u64::from(pick.weighed);
             let place = f64::from(another(Vec2::new(u_place, 0.0), salt, pick.light).x);
             let drawn = match pick.light {
-                Picked::Emitter(emitter) => self.by_angle_of(emitter, &stretch, place),
+                Picked::Emitter(emitter) => self.by_angle_of(emitter, stretch, place),
                 Picked::Beside(_) => Some(by_transmittance(stretch.length, extinction, place)),
             };
             let Some(Drawn { t, pdf }) = drawn else { return };
@@ -202,20 +247,15 @@ impl Integrator<'_> {
             let u = another(Vec2::new(lu, lv), !salt, pick.light);
             let Some(incoming) = self.incoming(pick.light, point, Vec3::ZERO, u) else { return };
             stats.rays += 1;
+            stats.shadow_rays += 1;
             let arriving = self.arriving(&Anchor::free(point), &incoming, accept);
             let turned = f64::from(fog.phase(incoming.direction, direction));
             let density = pick.probability * pdf * f64::from(incoming.pdf.unwrap_or(1.0));
             let weight = (turned / density) as f32;
-            let unblocked = fog.scattering * fog.through(t) * incoming.radiance * weight;
-            if arriving == Rgb::ZERO {
-                *blocked += f64::from(luminance(throughput * unblocked)).powi(2);
-                return;
-            }
-            let light = unblocked * arriving;
-            self.count_in_group(pick.light, throughput * light, by_group);
-            sum += light;
+            let whole = fog.scattering * fog.through(t) * incoming.radiance * weight;
+            visit(pick.light, whole, arriving);
         });
-        sum
+        stats.groups += picks.weighed() - weighed;
     }
 }
 

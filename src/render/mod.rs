@@ -10,6 +10,7 @@
 //! | [`path`] | how does light get from a lamp to the eye? |
 //! | [`direct`], [`fog`] | what do picked lights give a surface, what a stretch of fog? |
 //! | [`picker`] | which lights are sampled there, and how often is each expected to be? |
+//! | [`knob`] | how readily are clusters split, if nobody says? |
 //! | [`camera`] | which ray belongs to a point of the picture? |
 //! | [`rays`] | what does a ray hit, and is a light visible? |
 //! | [`surface`] | what is there: normals, textures, material? |
@@ -37,6 +38,7 @@ pub mod film;
 pub mod fog;
 pub mod frame_names;
 pub mod frames;
+pub mod knob;
 pub mod layers;
 pub mod light_groups;
 mod motion;
@@ -54,6 +56,7 @@ pub mod surface;
 pub use crop::{CropError, Window};
 pub use delegate::{FrameStats, RenderDelegate, RenderError, RenderedFrame};
 pub use film::Film;
+pub use knob::{Knobs, Split};
 pub use layers::Aov;
 pub use light_groups::{LightGroupError, LightGroupRule, LightGroups};
 pub use passes::{Control, Progress};

@@ -10,13 +10,14 @@ use super::bsdf::Reflection;
 use super::camera::{CameraRay, CameraRays};
 use super::direct::power_heuristic;
 use super::fog::Fog;
+use super::knob::Trial;
 use super::light_groups::LightGroups;
 use super::picker::{LightPicker, PickScratch, Wanted};
 use super::rays::{Anchor, Hit, HitSurface, Seen, SeenLight, Sender, Tracer};
 use super::settings::RenderSettings;
 use super::surface::Surfaces;
 use crate::emitter::{EmitterHit, InfiniteLight, PosedEmitters};
-use crate::light_tree::{Glossy, Lobes, Picked, Receiver};
+use crate::light_tree::{Glossy, Lobes, Picked, Receiver, Splitting};
 use crate::math::built_in;
 use crate::math::color::Rgb;
 use crate::math::random::{Sampler, hash};
@@ -81,6 +82,10 @@ pub struct TraceStats {
     pub rays: u64,
     /// Lights picked.
     pub light_picks: u64,
+    /// Those of the rays that asked whether a picked light is visible.
+    pub shadow_rays: u64,
+    /// Groups of the tree weighed to pick them.
+    pub groups: u64,
 }
 
 impl TraceStats {
@@ -89,6 +94,8 @@ impl TraceStats {
         TraceStats {
             rays: self.rays + other.rays,
             light_picks: self.light_picks + other.light_picks,
+            shadow_rays: self.shadow_rays + other.shadow_rays,
+            groups: self.groups + other.groups,
         }
     }
 }
@@ -96,6 +103,7 @@ impl TraceStats {
 /// The point that a reflected ray left, for the weight of a light that it hits.
 struct Origin {
     wanted: Wanted,
+    how: Splitting,
     point: Vec3,
     normal: Vec3,
     bsdf_pdf: f32,
@@ -125,6 +133,8 @@ pub struct PathScratch {
     pub blocked: f64,
     /// What it cost so far.
     pub stats: TraceStats,
+    /// Other knobs to try at each point, for a pilot.
+    pub(super) trial: Option<Box<Trial>>,
 }
 
 impl Integrator<'_> {
@@ -164,7 +174,8 @@ impl Integrator<'_> {
                     let (numbers, salt) = (sampler.next_4d(), hash(seed, !bounce));
                     let stretch = (origin, direction, length);
                     let numbers = (numbers, salt);
-                    let light = self.scattered(fog, stretch, numbers, &accept, throughput, scratch);
+                    let at = (bounce, throughput);
+                    let light = self.scattered(fog, stretch, numbers, &accept, at, scratch);
                     seen.add(bounce + 1, throughput * light);
                 }
             }
@@ -198,7 +209,8 @@ impl Integrator<'_> {
             let wanted = self.wanted(&vertex, &mut sampler);
             let [pick, lu, lv, roulette] = sampler.next_4d();
             let numbers = (pick, Vec2::new(lu, lv), hash(seed, bounce));
-            let direct = self.direct(&vertex, &wanted, numbers, &accept, throughput, scratch);
+            let at = (bounce, throughput);
+            let direct = self.direct(&vertex, &wanted, numbers, &accept, at, scratch);
             seen.add(bounce + 1, throughput * direct);
 
             let [lobe, bu, bv, _] = sampler.next_4d();
@@ -215,7 +227,8 @@ impl Integrator<'_> {
                 throughput /= survival;
             }
             let Receiver { point, normal } = vertex.receiver;
-            before = Some(Origin { wanted, point, normal, bsdf_pdf: next.pdf });
+            let how = *self.picker.splitting(bounce);
+            before = Some(Origin { wanted, how, point, normal, bsdf_pdf: next.pdf });
             origin = vertex.anchor.origin_toward(next.wi);
             direction = next.wi;
         }
@@ -375,8 +388,9 @@ impl Integrator<'_> {
         if !self.settings.mis {
             return 0.0;
         }
-        let expected = self.picker.expected(&before.wanted, light, &mut scratch.picks) as f32;
-        power_heuristic(before.bsdf_pdf, expected * pdf())
+        let Origin { wanted, how, bsdf_pdf, .. } = before;
+        let expected = self.picker.expected(wanted, how, light, &mut scratch.picks) as f32;
+        power_heuristic(*bsdf_pdf, expected * pdf())
     }
 }
 

@@ -4,6 +4,7 @@
 //! be picked. So the integrator cannot tell strategies apart, and a picture has the same mean under each.
 //! Forced lights bypass the strategy: each is always sampled.
 
+use super::knob::Knobs;
 use super::settings::{LightStrategy, RenderSettings};
 use crate::emitter::InfiniteLight;
 use crate::light_tree::{
@@ -23,6 +24,8 @@ pub struct LightPick {
     pub probability: f64,
     /// Expected number of picks, which enters the power heuristic; positive.
     pub expected: f64,
+    /// Groups that were weighed to find it below its cluster.
+    pub weighed: u32,
 }
 
 /// What light is wanted for.
@@ -86,11 +89,21 @@ macro_rules! with_viewer {
 /// Picks lights for one frame.
 pub struct LightPicker<'a> {
     strategy: LightStrategy,
-    splitting: Splitting,
+    /// Of a path's points, by how many bounces lie before them; the last is that of all later ones.
+    splitting: [Splitting; Knobs::KINDS],
     tree: FrameTree<'a>,
     infinite: &'a [InfiniteLight<'a>],
     /// Running sums of energy over emitters, then lights at infinity; only for the power strategy.
     running_power: Vec<f64>,
+}
+
+impl PickScratch {
+    /// Groups weighed to open the tree, since this was made.
+    pub fn weighed(&self) -> u64 {
+        let TreeScratch { at, glossy, along, distance_at, distance_along } = &self.tree;
+        let by_distance = distance_at.weighed + distance_along.weighed;
+        at.weighed + glossy.weighed + along.weighed + by_distance
+    }
 }
 
 impl<'a> LightPicker<'a> {
@@ -103,7 +116,8 @@ impl<'a> LightPicker<'a> {
         let strategy = settings.strategy;
         let by_power = strategy == LightStrategy::Power;
         let running_power = if by_power { running_power(&tree, infinite) } else { Vec::new() };
-        LightPicker { strategy, splitting: settings.splitting(), tree, infinite, running_power }
+        let splitting = std::array::from_fn(|bounce| settings.splitting(bounce as u32));
+        LightPicker { strategy, splitting, tree, infinite, running_power }
     }
 
     /// The tree that is picked from.
@@ -111,9 +125,14 @@ impl<'a> LightPicker<'a> {
         &self.tree
     }
 
+    /// How clusters are split for a point that a path reaches after so many bounces.
+    pub fn splitting(&self, bounce: u32) -> &Splitting {
+        &self.splitting[Knobs::kind(bounce)]
+    }
+
     /// Whether more than one light may be picked at a point, so that each needs numbers of its own.
-    pub fn takes_several(&self) -> bool {
-        !self.splitting.is_off()
+    pub fn takes_several(&self, how: &Splitting) -> bool {
+        !how.is_off()
             || self.strategy == LightStrategy::All
             || self.tree.forced_count() > 0
             || self.infinite.iter().any(|light| light.forced)
@@ -126,16 +145,17 @@ impl<'a> LightPicker<'a> {
 
     /// Whether the test of splitting asks for a direction that the surface reflects to.
     pub fn asks_for_direction(&self) -> bool {
-        !self.splitting.is_off() && self.splitting.test == SplitTest::SolidAngle
+        let asks = |how: &Splitting| !how.is_off() && how.test == SplitTest::SolidAngle;
+        self.splitting.iter().any(asks)
     }
 
     /// Picks lights with a random number in `[0, 1)` and calls `visit` with each. `salt` identifies the
-    /// point or stretch.
+    /// point or stretch, `how` tells how clusters are split for it.
     pub fn pick(
         &self,
         wanted: &Wanted,
-        u: f32,
-        salt: u32,
+        how: &Splitting,
+        (u, salt): (f32, u32),
         scratch: &mut PickScratch,
         mut visit: impl FnMut(LightPick),
     ) {
@@ -144,7 +164,7 @@ impl<'a> LightPicker<'a> {
         match self.strategy {
             LightStrategy::Uniform | LightStrategy::Power => self.pick_blindly(u, visit),
             LightStrategy::All => {
-                let one = |light| LightPick { light, probability: 1.0, expected: 1.0 };
+                let one = |light| LightPick { light, probability: 1.0, expected: 1.0, weighed: 0 };
                 (0..self.count()).for_each(|at| visit(one(self.light(at))));
             }
             LightStrategy::Exhaustive => self.pick_exhaustively(wanted, u, visit),
@@ -152,14 +172,20 @@ impl<'a> LightPicker<'a> {
                 let PickScratch { beside, tree } = scratch;
                 self.weigh_infinite(wanted, beside);
                 with_viewer!(self, wanted, tree, |viewer, room| {
-                    self.pick_from_tree(viewer, beside, (u, salt), room, visit)
+                    self.pick_from_tree(viewer, beside, how, (u, salt), room, visit)
                 });
             }
         }
     }
 
     /// How often [`pick`](Self::pick) is expected to pick a light.
-    pub fn expected(&self, wanted: &Wanted, light: Picked, scratch: &mut PickScratch) -> f64 {
+    pub fn expected(
+        &self,
+        wanted: &Wanted,
+        how: &Splitting,
+        light: Picked,
+        scratch: &mut PickScratch,
+    ) -> f64 {
         match light {
             Picked::Beside(row) if self.infinite[row as usize].forced => return 1.0,
             Picked::Emitter(emitter) if emitter >= self.tree.unforced_count() => {
@@ -177,18 +203,23 @@ impl<'a> LightPicker<'a> {
                 let PickScratch { beside, tree } = scratch;
                 self.weigh_infinite(wanted, beside);
                 with_viewer!(self, wanted, tree, |viewer, room| {
-                    self.tree.expected(viewer, beside, &self.splitting, light, room)
+                    self.tree.expected(viewer, beside, how, light, room)
                 })
             }
         }
     }
 
     /// The exact moments of an estimate by the tree, given what each light contributes.
-    pub fn moments(&self, wanted: &Wanted, contribution: &impl Fn(Picked, f64) -> f64) -> Moments {
+    pub fn moments(
+        &self,
+        wanted: &Wanted,
+        how: &Splitting,
+        contribution: &impl Fn(Picked, f64) -> f64,
+    ) -> Moments {
         let PickScratch { mut beside, mut tree } = PickScratch::default();
         self.weigh_infinite(wanted, &mut beside);
         with_viewer!(self, wanted, &mut tree, |viewer, _room| {
-            self.tree.moments(viewer, &beside, &self.splitting, contribution)
+            self.tree.moments(viewer, &beside, how, contribution)
         })
     }
 
@@ -196,25 +227,19 @@ impl<'a> LightPicker<'a> {
         &self,
         viewer: &V,
         beside: &[f64],
+        how: &Splitting,
         (u, salt): (f64, u32),
         scratch: &mut Scratch<V>,
         mut visit: impl FnMut(LightPick),
     ) {
         let mut visit = |pick: Pick| {
-            let (probability, expected) = (pick.probability, pick.expected);
-            visit(LightPick { light: pick.light, probability, expected });
+            let Pick { light, probability, expected, weighed, .. } = pick;
+            visit(LightPick { light, probability, expected, weighed });
         };
-        if self.splitting.is_off() && (beside.is_empty() || !built_in::DOMES) {
+        if how.is_off() && (beside.is_empty() || !built_in::DOMES) {
             self.tree.sample(viewer, u).into_iter().for_each(visit);
         } else {
-            self.tree.for_each_pick(
-                viewer,
-                beside,
-                &self.splitting,
-                (u, salt),
-                scratch,
-                &mut visit,
-            );
+            self.tree.for_each_pick(viewer, beside, how, (u, salt), scratch, &mut visit);
         }
     }
 
@@ -227,11 +252,13 @@ impl<'a> LightPicker<'a> {
             });
             if let Some(pick) = pick {
                 let probability = pick.probability;
-                visit(LightPick { light: pick.light, probability, expected: probability });
+                let weighed = pick.weighed;
+                visit(LightPick { light: pick.light, probability, expected: probability, weighed });
             }
         }
         for (row, _) in (0..).zip(self.infinite).filter(|(_, light)| light.forced) {
-            visit(LightPick { light: Picked::Beside(row), probability: 1.0, expected: 1.0 });
+            let light = Picked::Beside(row);
+            visit(LightPick { light, probability: 1.0, expected: 1.0, weighed: 0 });
         }
     }
 
@@ -262,7 +289,7 @@ impl<'a> LightPicker<'a> {
         let light = self.light(at.min(last));
         let probability = self.blind_probability(light);
         if probability > 0.0 {
-            visit(LightPick { light, probability, expected: probability });
+            visit(LightPick { light, probability, expected: probability, weighed: 0 });
         }
     }
 
@@ -299,7 +326,7 @@ impl<'a> LightPicker<'a> {
         });
         if let Some((light, importance)) = picked {
             let probability = importance / total;
-            visit(LightPick { light, probability, expected: probability });
+            visit(LightPick { light, probability, expected: probability, weighed: 0 });
         }
     }
 

@@ -1,6 +1,7 @@
 //! Render settings: the knobs of a render.
 
 use super::crop::{CropError, Window};
+use super::knob::Split;
 use super::layers::Aov;
 use super::light_groups::LightGroupRule;
 use crate::light_tree::{SplitTest, Splitting};
@@ -58,9 +59,8 @@ pub struct RenderSettings {
     pub seed: u32,
     /// How a light is picked.
     pub strategy: LightStrategy,
-    /// How readily clusters are split, `[0, 1]`: 0 samples one light at a point, 1 every one. For the
-    /// strategies that [split](LightStrategy::splits).
-    pub split: f32,
+    /// How readily clusters are split. For the strategies that [split](LightStrategy::splits).
+    pub split: Split,
     /// At most so many lights are sampled at a point, beside the forced ones.
     pub max_lights: u32,
     /// What makes a cluster worth splitting.
@@ -87,7 +87,7 @@ impl Default for RenderSettings {
             depth: 5,
             seed: 0,
             strategy: LightStrategy::default(),
-            split: 0.5,
+            split: Split::default(),
             max_lights: 64,
             split_by: SplitBy::default(),
             mis: true,
@@ -109,10 +109,10 @@ impl RenderSettings {
         self.crop.unwrap_or(whole).inside(self.width, self.height)
     }
 
-    /// How the tree is to be split.
-    pub fn splitting(&self) -> Splitting {
+    /// How the tree is to be split for a point that a path reaches after so many bounces.
+    pub fn splitting(&self, bounce: u32) -> Splitting {
         Splitting {
-            knob: if self.strategy.splits() { self.split } else { 0.0 },
+            knob: if self.strategy.splits() { self.split.knobs().at(bounce) } else { 0.0 },
             most: self.max_lights.max(1),
             test: match self.split_by {
                 SplitBy::Variance => SplitTest::Variance,

@@ -9,7 +9,7 @@ use candelabra::pipeline::{
     self, OpenedTree, ShotTrees, Standing, TreeError, TreeFile, check_fresh, collect_emitters,
     rebuild_tree, standing,
 };
-use candelabra::render::{LightStrategy, RenderDelegate, RenderSettings};
+use candelabra::render::{LightStrategy, RenderDelegate, RenderSettings, Split};
 use candelabra::scene::Scene;
 use candelabra::store::AlignedBytes;
 use glam::Vec3;
@@ -179,7 +179,7 @@ fn every_strategy_survives_what_nobody_verified() {
                 height: 2,
                 samples: 1,
                 strategy: strategies[round % strategies.len()],
-                split: [0.0, 0.5, 1.0][round % 3],
+                split: Split::Fixed([0.0, 0.5, 1.0][round % 3]),
                 ..Default::default()
             };
             let camera = owner.scene.cameras[0].clone();

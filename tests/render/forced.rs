@@ -8,7 +8,7 @@ use crate::statistics::pixels;
 use crate::strategies::{Way, disagreement, render};
 use candelabra::light_tree::{Picked, Receiver, Scratch, Splitting, TreeKind};
 use candelabra::pipeline::{NoLightThere, force_lights};
-use candelabra::render::{LightStrategy, RenderDelegate, RenderSettings};
+use candelabra::render::{LightStrategy, RenderDelegate, RenderSettings, Split};
 use candelabra::scene::{LightKind, Node, Scene};
 use glam::{DVec3, Vec3};
 use std::f64::consts::PI;
@@ -169,7 +169,7 @@ fn a_forced_sun_is_sampled_beside_the_pick() {
     for (forced, picks) in [(false, 1), (true, 2)] {
         stage.scene.lights[1].forced = forced;
         let set = stage.set();
-        let settings = RenderSettings { split: 0.0, ..direct(4, 16) };
+        let settings = RenderSettings { split: Split::Fixed(0.0), ..direct(4, 16) };
         let camera = stage.scene.cameras[0].clone();
         let delegate = RenderDelegate::new(set.scene, &set.emitters, camera, settings);
         let seen = delegate.render(&set.tree, 1, &()).unwrap();
@@ -236,7 +236,8 @@ fn forcing_a_strong_light_behind_a_wall_quiets_the_picture() {
         let shared = set.tree.trees().iter().filter(|r| TreeKind::of(r) == Some(TreeKind::Shared));
         assert_eq!(shared.count(), usize::from(forced));
         let own = settings(forced.into());
-        let buffers = set.render(&RenderSettings { samples: 4096, split: 0.0, ..own }, 1);
+        let buffers =
+            set.render(&RenderSettings { samples: 4096, split: Split::Fixed(0.0), ..own }, 1);
         let noise: f64 = pixels(&buffers).iter().map(|p| p.variance.as_dvec3().y).sum();
         seen.push((noise, buffers));
     }

@@ -10,6 +10,7 @@ mod far;
 mod fitted;
 mod fog;
 mod forced;
+mod knobs;
 mod layers;
 mod lens;
 mod moving;

@@ -6,7 +6,7 @@ use candelabra::math::color::luminance;
 use candelabra::render::noise::{Grey, Reference};
 use candelabra::render::passes::{ErrorGoal, Planned, Reached, ToError, Uniform};
 use candelabra::render::{
-    Aov, Control, Film, Progress, RenderDelegate, RenderError, RenderSettings, RenderedFrame,
+    Aov, Control, Film, Progress, RenderDelegate, RenderError, RenderSettings, RenderedFrame, Split,
 };
 use candelabra::scene::{LightKind, Scene};
 use glam::{DVec3, Vec3};
@@ -53,7 +53,7 @@ fn luminances(frame: &RenderedFrame) -> Vec<f64> {
 
 fn settings() -> RenderSettings {
     // One light at a point: there is noise to be told of.
-    RenderSettings { float_beauty: true, split: 0.0, ..direct(SIZE, 16) }
+    RenderSettings { float_beauty: true, split: Split::Fixed(0.0), ..direct(SIZE, 16) }
 }
 
 /// The same of a quarter of the pixels.

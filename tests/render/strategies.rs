@@ -12,7 +12,7 @@ use crate::stage::{Set, Stage, aimed, by, direct};
 use crate::statistics::{Estimate, Pixel, blocks, pixels};
 use candelabra::light_tree::{Receiver, Scratch};
 use candelabra::render::buffers::RenderBuffers;
-use candelabra::render::{LightStrategy, RenderSettings, SplitBy};
+use candelabra::render::{LightStrategy, RenderSettings, Split, SplitBy};
 use candelabra::scene::{LightKind, Shaping};
 use glam::{DVec3, Vec3};
 
@@ -52,7 +52,7 @@ impl Way {
 
     pub fn settings(&self, mis: bool, settings: &RenderSettings) -> RenderSettings {
         RenderSettings {
-            split: self.split,
+            split: Split::Fixed(self.split),
             split_by: self.split_by,
             max_lights: self.most,
             ..by(self.strategy, mis, settings)
@@ -266,7 +266,7 @@ fn no_point_samples_more_lights_than_it_may() {
             let settings = RenderSettings::default();
             let by_angle = Way { split_by: SplitBy::SolidAngle, ..Way::split(0.5) };
             for way in [Way::split(0.3), Way::split(1.0), by_angle] {
-                let how = Way { most, ..way }.settings(true, &settings).splitting();
+                let how = Way { most, ..way }.settings(true, &settings).splitting(0);
                 let (mut sum, mut largest) = (0, 0);
                 for i in 0..1000 {
                     let t = i as f32;

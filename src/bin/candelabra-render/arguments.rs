@@ -5,7 +5,9 @@ use candelabra::pipeline::{Effort, Preview, RenderJob, Strict, View, option};
 use candelabra::render::frame_names::FrameNames;
 use candelabra::render::frames::Frames;
 use candelabra::render::noise::Grey;
-use candelabra::render::{Aov, LightGroupRule, LightStrategy, RenderSettings, SplitBy, Window};
+use candelabra::render::{
+    Aov, LightGroupRule, LightStrategy, RenderSettings, Split, SplitBy, Window,
+};
 use candelabra::scene::Medium;
 use clap::{Parser, ValueEnum};
 use std::path::PathBuf;
@@ -70,9 +72,10 @@ pub struct Arguments {
     /// How lights are picked
     #[arg(long, value_enum, default_value_t = Strategy::Tree)]
     pub light_sampler: Strategy,
-    /// How readily clusters of lights are split: 0 samples one light at a point, 1 every one
-    #[arg(long, default_value_t = RenderSettings::default().split, value_parser = option::knob)]
-    pub split: f32,
+    /// How readily clusters of lights are split: 0 samples one light at a point, 1 every one [default:
+    /// measured in a small picture of the shot]
+    #[arg(long, value_parser = option::knob)]
+    pub split: Option<f32>,
     /// At most so many lights are sampled at a point, beside the forced ones
     #[arg(long, default_value_t = RenderSettings::default().max_lights, value_parser = clap::value_parser!(u32).range(1..))]
     pub max_lights: u32,
@@ -225,7 +228,7 @@ impl Arguments {
                 Strategy::Exhaustive => LightStrategy::Exhaustive,
                 Strategy::All => LightStrategy::All,
             },
-            split: self.split,
+            split: self.split.map_or(Split::Auto, Split::Fixed),
             max_lights: self.max_lights,
             split_by: match self.split_by {
                 Test::Variance => SplitBy::Variance,

@@ -4,7 +4,7 @@ use crate::shot::Shot;
 use anyhow::Result;
 use candelabra::measure::{Entrant, RaceOptions, race};
 use candelabra::pipeline::option;
-use candelabra::render::{LightStrategy, RenderDelegate, RenderSettings, SplitBy};
+use candelabra::render::{LightStrategy, RenderDelegate, RenderSettings, Split, SplitBy};
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::io::Write;
@@ -42,7 +42,7 @@ pub struct Arguments {
 struct Way {
     name: String,
     strategy: LightStrategy,
-    split: f32,
+    split: Split,
     split_by: SplitBy,
     samples: u32,
 }
@@ -55,7 +55,9 @@ fn way(text: &str) -> Result<Way, String> {
     let read = |text: &str| serde_json::from_value(serde_json::Value::String(text.into()));
     let strategy = read(parts.next().unwrap_or_default()).map_err(|_| wrong())?;
     let split = parts.next().map_or(Ok(RenderSettings::default().split), |text| {
-        option::knob(text).map_err(|help| format!("{}; for SPLIT, {help}", wrong()))
+        option::knob(text)
+            .map(Split::Fixed)
+            .map_err(|help| format!("{}; for SPLIT, {help}", wrong()))
     })?;
     let read = |text: &str| serde_json::from_value(serde_json::Value::String(text.into()));
     let split_by =

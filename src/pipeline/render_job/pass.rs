@@ -12,12 +12,14 @@ use super::shot::Shot;
 use super::writer::{Finished, Writer, write_preview};
 use super::{RenderError, RenderJob};
 use crate::emitter::Emitters;
+use crate::light_tree::LightTree;
 use crate::pipeline::{
     Event, PreviewStamp, ShotTrees, Stamp, Stamper, TreeError, Watch, frames_of,
 };
 use crate::render::beauty::Beauty;
+use crate::render::knob::pilot;
 use crate::render::noise::Grey;
-use crate::render::{self, Progress, RenderDelegate};
+use crate::render::{self, Progress, RenderDelegate, RenderSettings, Split};
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 use std::time::{Duration, Instant};
@@ -34,6 +36,8 @@ pub(super) struct Pass<'a> {
     clock: &'a mut Clock,
     /// Prepared when the first frame needs it: a shot that is done resumes at once.
     delegate: Option<RenderDelegate<'a>>,
+    /// Settings with the knobs of splitting found, once they are needed.
+    settings: Option<RenderSettings>,
     /// Small pictures of frames, made when they are needed.
     glimpses: BTreeMap<i32, Glimpse>,
     progress: FrameProgress<'a>,
@@ -106,6 +110,7 @@ impl<'a> Pass<'a> {
             watch,
             clock,
             delegate: None,
+            settings: None,
             glimpses: BTreeMap::new(),
             progress: FrameProgress::new(watch, frames),
             rendered: 0,
@@ -150,12 +155,14 @@ impl<'a> Pass<'a> {
         self.outputs.check_frame(frame)?;
         let exposure = self.exposure()?;
         let grey = self.grey()?;
+        let settings = self.settings()?;
         let stamp = self.stamp(frame, plan.as_deref())?;
         let deadline = self.deadline(writer);
         self.progress.until = deadline.as_ref().map(Deadline::latest);
 
         let Pass { job, delegate, shot, emitters, trees, progress, watch, clock, .. } = self;
         let delegate = prepared(delegate, shot, emitters, *watch, clock);
+        delegate.set_settings(settings.clone());
         let tree = trees.for_frame(frame)?;
         clock.lap(|seconds| &mut seconds.trees);
         let picture = self.outputs.picture(frame);
@@ -173,7 +180,6 @@ impl<'a> Pass<'a> {
         if let (Some(pixels), Some(grey), Some(noise)) = (job.audit, grey, &mut noise) {
             let audited =
                 audit(delegate, &tree, frame, (&film, grey), &shot.settings, (pixels, &*progress))?;
-            delegate.set_settings(shot.settings.clone());
             noise.audit = Some(audited);
             clock.lap(|seconds| &mut seconds.audit);
         }
@@ -235,19 +241,36 @@ impl<'a> Pass<'a> {
         Ok(Some(Grey::below(middle(glimpses))))
     }
 
+    /// The settings, with the knobs of splitting that are best for the shot: by a pilot in the scene's first
+    /// frame, whatever frames are asked for.
+    fn settings(&mut self) -> Result<RenderSettings, Trouble> {
+        if let Some(settings) = &self.settings {
+            return Ok(settings.clone());
+        }
+        let Pass { job, delegate, shot, emitters, trees, watch, clock, .. } = self;
+        let samples = match job.effort.looks() {
+            true => shot.settings.samples.min(RenderSettings::default().samples),
+            false => shot.settings.samples,
+        };
+        let delegate = prepared(delegate, shot, emitters, *watch, clock);
+        delegate.set_settings(RenderSettings { samples, ..shot.settings.clone() });
+        let frame = frames_of(&shot.scene)[0];
+        let knobs = of_any_frame(shot, emitters, trees, frame, |tree| {
+            pilot(delegate, tree, frame).map_err(render::RenderError::from)
+        })?;
+        self.clock.lap(|seconds| &mut seconds.ahead);
+        let split = Split::ByBounce(knobs);
+        Ok(self.settings.insert(RenderSettings { split, ..self.shot.settings.clone() }).clone())
+    }
+
     /// A small picture of a frame.
     fn glimpse(&mut self, frame: i32) -> Result<&Glimpse, Trouble> {
         if !self.glimpses.contains_key(&frame) {
             let Pass { delegate, shot, emitters, trees, watch, clock, .. } = self;
             let delegate = prepared(delegate, shot, emitters, *watch, clock);
-            let seen = match trees.for_frame(frame) {
-                // The file may be of other frames; the picture is the same all the same.
-                Err(TreeError::NoSuchFrame { .. }) => {
-                    let mut own = ShotTrees::built(&shot.scene, emitters)?;
-                    glimpse(shot, delegate, &own.for_frame(frame)?, frame, *watch)
-                }
-                tree => glimpse(shot, delegate, &tree?, frame, *watch),
-            }?;
+            let seen = of_any_frame(shot, emitters, trees, frame, |tree| {
+                glimpse(shot, delegate, tree, frame, *watch)
+            })?;
             self.clock.lap(|seconds| &mut seconds.ahead);
             self.glimpses.insert(frame, seen);
         }
@@ -288,6 +311,23 @@ impl<'a> Pass<'a> {
         self.clock.lap(|seconds| &mut seconds.resume);
         Ok(true)
     }
+}
+
+/// Calls `work` with the tree of a frame of the scene. The file may be of other frames; then one is built.
+fn of_any_frame<'a, T>(
+    shot: &'a Shot,
+    emitters: &'a Emitters,
+    trees: &mut ShotTrees<'a>,
+    frame: i32,
+    work: impl FnOnce(&LightTree<&[u8]>) -> Result<T, render::RenderError>,
+) -> Result<T, Trouble> {
+    Ok(match trees.for_frame(frame) {
+        Err(TreeError::NoSuchFrame { .. }) => {
+            let mut own = ShotTrees::built(&shot.scene, emitters)?;
+            work(&own.for_frame(frame)?)
+        }
+        tree => work(&tree?),
+    }?)
 }
 
 /// The delegate, with what rays hit prepared.

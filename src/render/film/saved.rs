@@ -8,8 +8,8 @@ use std::io::{self, Write};
 impl Film {
     /// Writes all that further samples depend on, numbers in little-endian order.
     pub fn save(&self, out: &mut impl Write) -> io::Result<()> {
-        let TraceStats { rays, light_picks } = self.trace;
-        for number in [rays, light_picks] {
+        let TraceStats { rays, light_picks, shadow_rays, groups } = self.trace;
+        for number in [rays, light_picks, shadow_rays, groups] {
             out.write_all(&number.to_le_bytes())?;
         }
         out.write_all(bytemuck::cast_slice(&self.taken))?;
@@ -30,7 +30,12 @@ impl Film {
     /// samples. `None` if the bytes cannot be that.
     pub fn restored(mut self, bytes: &[u8]) -> Option<Film> {
         let mut rest = bytes;
-        self.trace = TraceStats { rays: one(&mut rest)?, light_picks: one(&mut rest)? };
+        self.trace = TraceStats {
+            rays: one(&mut rest)?,
+            light_picks: one(&mut rest)?,
+            shadow_rays: one(&mut rest)?,
+            groups: one(&mut rest)?,
+        };
         fill(&mut self.taken, &mut rest)?;
         fill(&mut self.targets, &mut rest)?;
         fill(&mut self.sums, &mut rest)?;

@@ -1,0 +1,174 @@
+//! The pilot: a few paths of a shot that find out which knobs are best for it.
+//!
+//! It traces paths through pixels that are spread over the picture, and at each point also picks lights with
+//! other knobs ([`trial`](super::trial)). The error is that of [`noise`](crate::render::noise). It depends
+//! on scene, tree, frame and settings alone. A shot takes the knobs of one frame, the same in every process.
+
+use super::choice::{Findings, Tried};
+use super::prices::cost;
+use super::trial::{Each, KNOBS, Trial};
+use super::{Knobs, Split};
+use crate::light_tree::{LightTree, NoSuchFrame};
+use crate::math::color::luminance;
+use crate::math::random::hash;
+use crate::render::RenderDelegate;
+use crate::render::noise::{Grey, Halves};
+use crate::render::path::{Integrator, PathScratch, TraceStats};
+use rayon::prelude::*;
+use std::ops::Range;
+
+/// Paths through a pixel, in each of its two halves.
+const PATHS: u32 = 4;
+/// One pilot path for so many paths of a frame. With all that is tried on it, a path takes the time of
+/// about twelve.
+const FRAME_PATHS: u64 = 500;
+/// Pixels that are enough.
+const MOST_PIXELS: u64 = 512;
+/// With fewer nothing can be learnt.
+const LEAST_PIXELS: u64 = 24;
+/// No pixel is more than this share of the noise: one bright sample would decide alone.
+const LARGEST_SHARE: f64 = 0.125;
+/// The random numbers are not those of any frame.
+const SEED: u32 = 0x6b6e_6f62;
+/// The first of [`KNOBS`] that are tried only if the one before turns out to be the best: they cost most.
+const FIRST_COSTLY: usize = 6;
+
+/// The knobs for a shot with the delegate's settings, by a frame of it. Without [`Split::Auto`] they are
+/// those that the settings tell. A picture of few paths gets the usual ones, because to find out more
+/// would cost more than it gains.
+///
+/// # Errors
+/// If the tree lacks the frame.
+///
+/// # Panics
+/// As [`RenderDelegate::at_frame`].
+pub fn pilot(
+    delegate: &RenderDelegate,
+    tree: &LightTree<impl AsRef<[u8]>>,
+    frame: i32,
+) -> Result<Knobs, NoSuchFrame> {
+    delegate.at_frame(tree, frame, knobs_for)
+}
+
+fn knobs_for(integrator: &Integrator) -> Knobs {
+    let settings = integrator.settings;
+    let paths = [settings.width, settings.height, settings.samples].map(u64::from);
+    let pixels =
+        (paths.iter().product::<u64>() / FRAME_PATHS / u64::from(2 * PATHS)).min(MOST_PIXELS);
+    let is_asked = settings.split == Split::Auto && settings.strategy.splits();
+    if !is_asked || settings.depth == 0 || pixels < LEAST_PIXELS {
+        return settings.split.knobs();
+    }
+    let tried = |kind: usize, range: Range<usize>| {
+        if kind < settings.depth as usize { range } else { 0..0 }
+    };
+    let handicap = MOST_PIXELS as f64 / pixels as f64;
+    let cheap = std::array::from_fn(|kind| tried(kind, 0..FIRST_COSTLY));
+    let mut findings = traced(integrator, pixels as u32, cheap);
+    let best = findings.best(handicap);
+    let costly: [Range<usize>; Knobs::KINDS] = std::array::from_fn(|kind| {
+        let is_last = best.by_bounce[kind] >= KNOBS[FIRST_COSTLY - 1];
+        tried(kind, if is_last { FIRST_COSTLY..KNOBS.len() } else { 0..0 })
+    });
+    if costly.iter().all(Range::is_empty) {
+        return best;
+    }
+    let more = traced(integrator, pixels as u32, costly);
+    let known = findings.picking.as_flattened_mut().iter_mut();
+    known.zip(more.picking.as_flattened()).for_each(|(own, new)| *own = own.or(*new));
+    findings.best(handicap)
+}
+
+/// What the paths through one pixel showed.
+struct Pixel {
+    halves: Halves,
+    /// Variance of the pixel's mean that is from picking.
+    picking: Each<f64>,
+    /// What picking cost.
+    spent: Each<TraceStats>,
+    /// What the paths themselves cost.
+    own: TraceStats,
+}
+
+/// Traces the paths and tries some knobs at their points.
+fn traced(integrator: &Integrator, pixels: u32, tried: [Range<usize>; Knobs::KINDS]) -> Findings {
+    let row = |number| pixel(integrator, number, &tried);
+    let pixels: Vec<Pixel> = (0..pixels).into_par_iter().map(row).collect();
+    let count = pixels.len() as f64;
+    let mean = pixels.iter().map(|pixel| pixel.halves.luminance()).sum::<f64>() / count;
+    let grey = Grey::below(mean);
+    let error = |of: &dyn Fn(&Pixel) -> f64| {
+        let own = |pixel: &Pixel| grey.of_deviation(of(pixel), pixel.halves.luminance());
+        steady_mean(&pixels.iter().map(own).collect::<Vec<_>>())
+    };
+    let paths = count * f64::from(2 * PATHS);
+    let spent = |of: &dyn Fn(&Pixel) -> TraceStats| {
+        cost(&pixels.iter().map(of).fold(TraceStats::default(), TraceStats::plus)) / paths
+    };
+    let mut findings = Findings {
+        variance: steady_mean(
+            &pixels.iter().map(|pixel| pixel.halves.squared_error(grey)).collect::<Vec<_>>(),
+        ),
+        cost: spent(&|pixel| TraceStats {
+            rays: pixel.own.rays - pixel.own.shadow_rays,
+            ..TraceStats::default()
+        }),
+        ..Findings::default()
+    };
+    for (kind, range) in tried.into_iter().enumerate() {
+        for knob in range {
+            findings.picking[kind][knob] = Some(Tried {
+                variance: error(&|pixel| pixel.picking[kind][knob]),
+                // Two estimates were made.
+                cost: 0.5 * spent(&|pixel| pixel.spent[kind][knob]),
+            });
+        }
+    }
+    findings
+}
+
+/// The mean, in which none of the numbers counts for more than a share of all of them.
+fn steady_mean(numbers: &[f64]) -> f64 {
+    let most = LARGEST_SHARE * numbers.iter().sum::<f64>();
+    numbers.iter().map(|number| number.min(most)).sum::<f64>() / numbers.len() as f64
+}
+
+fn pixel(integrator: &Integrator, number: u32, tried: &[Range<usize>; Knobs::KINDS]) -> Pixel {
+    let settings = integrator.settings;
+    // The additive sequence of the plastic number (Roberts 2018) spreads any number of pixels evenly.
+    let along =
+        |step: f64, length: u32| ((f64::from(number) * step).fract() * f64::from(length)) as u32;
+    let (x, y) = (
+        along(0.754_877_666_246_693, settings.width),
+        along(0.569_840_290_998_053, settings.height),
+    );
+    let trial = Box::new(Trial::new(*integrator.picker.splitting(0), tried.clone()));
+    let mut scratch = PathScratch::default();
+    scratch.trial = Some(trial);
+    let mut halves = Halves { counts: [PATHS; 2], ..Halves::default() };
+    let mut picking = Each::default();
+    for half in 0..2 {
+        let seed = hash(hash(SEED, number), half);
+        let mut sum = 0.0;
+        for index in 0..PATHS {
+            if let Some(trial) = &mut scratch.trial {
+                if index == 0 {
+                    trial.begin(seed);
+                }
+                trial.next_path(index);
+            }
+            let light =
+                f64::from(luminance(integrator.trace(x, y, seed, index, &mut scratch).radiance));
+            sum += if light.is_finite() { light } else { 0.0 };
+        }
+        halves.means[half as usize] = sum / f64::from(PATHS);
+        let found = scratch.trial.as_ref().map(|trial| trial.differences).unwrap_or_default();
+        for (sum, difference) in picking.as_flattened_mut().iter_mut().zip(found.as_flattened()) {
+            // Half a squared difference is the variance of a half's mean; a quarter of it that of both.
+            let off = difference / f64::from(PATHS);
+            *sum += if off.is_finite() { 0.125 * off * off } else { 0.0 };
+        }
+    }
+    let spent = scratch.trial.map(|trial| trial.spent).unwrap_or_default();
+    Pixel { halves, picking, spent, own: scratch.stats }
+}
