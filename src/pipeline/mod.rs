@@ -48,7 +48,8 @@ pub use fresh::{
 };
 pub use read::ReadError;
 pub use render_job::{
-    FrameCounts, Preview, RenderError, RenderJob, RenderReport, SceneCounts, Seconds,
+    Audit, Effort, FrameCounts, FrameNoise, Preview, Quality, RenderError, RenderJob, RenderReport,
+    SceneCounts, Seconds,
 };
 pub use rig::carry_camera;
 pub use shot_trees::{ShotTrees, TreeChoice, TreeFile, with_trees};

@@ -3,6 +3,8 @@
 //! Each function reads the text of one value and refuses what no render can use: what is no number,
 //! not finite, or out of range. The error tells what to write.
 
+use super::render_job::Quality;
+use crate::render::noise::Grey;
 use crate::scene::Medium;
 use glam::{DVec3, Vec3};
 
@@ -18,6 +20,35 @@ const FARTHEST_M: f64 = 1e18;
 /// A knob: a number from 0 to 1.
 pub fn knob(text: &str) -> Result<f32, String> {
     number(text, |knob| (0.0..=1.0).contains(knob), "write a number from 0 to 1")
+}
+
+/// The error of a frame: a name, or a number from 0.0001 to 10.
+pub fn error(text: &str) -> Result<f64, String> {
+    let named = text.parse::<Quality>().map(Quality::error);
+    let number = || text.parse().ok().filter(|error| (1e-4..=10.0).contains(error));
+    named.ok().or_else(number).ok_or_else(|| {
+        "write draft (0.1), preview (0.05), final (0.02), or a number from 0.0001 to 10".into()
+    })
+}
+
+/// A time in seconds: `90`, `90s`, `10m`, `1.5h`.
+pub fn duration(text: &str) -> Result<f64, String> {
+    let (digits, unit) = match text.char_indices().last() {
+        Some((at, 's')) => (&text[..at], 1.0),
+        Some((at, 'm')) => (&text[..at], 60.0),
+        Some((at, 'h')) => (&text[..at], 3600.0),
+        _ => (text, 1.0),
+    };
+    let seconds = digits.parse::<f64>().ok().map(|number| number * unit);
+    seconds
+        .filter(|seconds| (0.01..=1e8).contains(seconds))
+        .ok_or_else(|| "write seconds, or a number with s, m or h: 90, 90s, 10m, 1.5h".into())
+}
+
+/// A grey floor: a luminance above 0.
+pub fn grey(text: &str) -> Result<Grey, String> {
+    let floor = text.parse().ok().and_then(Grey::new);
+    floor.ok_or_else(|| "write a luminance above 0, in the unit of the picture".into())
 }
 
 /// An exposure in stops.

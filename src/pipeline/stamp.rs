@@ -5,6 +5,7 @@
 //! stamp of a new one, however the files change while it is rendered.
 
 use super::content::scene_fingerprint;
+use super::render_job::{Effort, FrameNoise};
 use crate::light_tree::ALGORITHM_VERSION;
 use crate::render::RenderSettings;
 use crate::render::exr::read_metadata;
@@ -35,9 +36,19 @@ pub struct Stamp {
     pub settings: serde_json::Value,
     /// The camera, for people.
     pub camera: serde_json::Value,
+    /// What its noise has come to, if that was looked at.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub noise: Option<FrameNoise>,
 }
 
 impl Stamp {
+    /// Whether two pictures are of the same. What their noise is found to be may differ: it can be looked
+    /// at more or less closely.
+    pub fn is_of_same(&self, other: &Stamp) -> bool {
+        let of = |stamp: &Stamp| Stamp { noise: None, ..stamp.clone() };
+        of(self) == of(other)
+    }
+
     /// The stamp of a picture, if every byte of its file is as it was written.
     pub fn of_picture(path: &Path) -> Option<Stamp> {
         serde_json::from_str(&read_metadata(path)?).ok()
@@ -83,10 +94,11 @@ impl Stamper {
     pub fn new(
         scene: &Scene,
         camera: &Camera,
-        settings: &RenderSettings,
+        (settings, effort): (&RenderSettings, &Effort),
         rest: impl fmt::Debug,
     ) -> io::Result<Stamper> {
-        let settings = serde_json::to_value(settings).map_err(io::Error::other)?;
+        let mut settings = serde_json::to_value(settings).map_err(io::Error::other)?;
+        settings["effort"] = serde_json::to_value(effort).map_err(io::Error::other)?;
         let place = place_of(scene, camera);
         let mut common = blake3::Hasher::new();
         common.update(&scene_fingerprint(scene));
@@ -98,22 +110,25 @@ impl Stamper {
         Ok(Stamper { common, settings, camera })
     }
 
-    /// The fingerprint of a frame, without its tree.
-    pub fn fingerprint(&self, frame: i32) -> String {
+    /// The fingerprint of a frame, without its tree. `plan` has the numbers of samples of its pixels, if
+    /// they are given.
+    pub fn fingerprint(&self, frame: i32, plan: Option<&[u32]>) -> String {
         let mut hasher = self.common.clone();
         hasher.update(&frame.to_le_bytes());
+        hasher.update(bytemuck::cast_slice(plan.unwrap_or_default()));
         hasher.finalize().to_hex().to_string()
     }
 
     /// The stamp of a frame, with the digest of what it samples of the tree.
-    pub fn stamp(&self, frame: i32, tree: [u8; 32]) -> Stamp {
+    pub fn stamp(&self, frame: i32, plan: Option<&[u32]>, tree: [u8; 32]) -> Stamp {
         Stamp {
             software: SOFTWARE.into(),
             frame,
-            fingerprint: self.fingerprint(frame),
+            fingerprint: self.fingerprint(frame, plan),
             tree: blake3::Hash::from(tree).to_hex().to_string(),
             settings: self.settings.clone(),
             camera: self.camera.clone(),
+            noise: None,
         }
     }
 }

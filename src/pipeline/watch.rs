@@ -4,6 +4,7 @@
 //! flag that a signal sets. As JSON, one object a line, events are what `--progress json` prints and what
 //! `candelabra run` reads from the programs that it starts.
 
+use super::render_job::FrameNoise;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
@@ -38,6 +39,9 @@ pub enum Event {
         rays: u64,
         /// Lights picked.
         light_picks: u64,
+        /// What its noise has come to, if that was looked at.
+        #[serde(default)]
+        noise: Option<FrameNoise>,
         /// The picture.
         output: PathBuf,
     },
@@ -88,6 +92,7 @@ mod tests {
                 seconds: 1.5,
                 rays: 7,
                 light_picks: 3,
+                noise: None,
                 output: "out/street.1001.exr".into(),
             },
             Event::UpToDate { frame: None, output: "street.ltree".into() },

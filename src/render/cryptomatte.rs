@@ -65,13 +65,18 @@ impl ObjectIds {
 }
 
 /// How often each prim was seen through a pixel.
-#[derive(Debug, Default)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Coverage(Vec<(u32, u32)>);
 
 impl Coverage {
-    /// Forgets all.
-    pub fn clear(&mut self) {
-        self.0.clear();
+    /// From ids and counts, in the order in which they were first seen.
+    pub fn of_pairs(pairs: Vec<(u32, u32)>) -> Coverage {
+        Coverage(pairs)
+    }
+
+    /// Ids and counts, in the order in which they were first seen.
+    pub fn pairs(&self) -> &[(u32, u32)] {
+        &self.0
     }
 
     /// Counts a sample.
@@ -83,10 +88,11 @@ impl Coverage {
     }
 
     /// The pairs of the largest coverages, of `samples` in all: id, coverage, id, coverage, ...
-    pub fn ranked(&mut self, samples: u32) -> [f32; 2 * PAIRS] {
-        self.0.sort_unstable_by_key(|&(id, count)| (std::cmp::Reverse(count), id));
+    pub fn ranked(&self, samples: u32) -> [f32; 2 * PAIRS] {
+        let mut sorted = self.0.clone();
+        sorted.sort_unstable_by_key(|&(id, count)| (std::cmp::Reverse(count), id));
         let mut values = [0.0; 2 * PAIRS];
-        for (pair, (id, count)) in values.chunks_mut(2).zip(&self.0) {
+        for (pair, (id, count)) in values.chunks_mut(2).zip(&sorted) {
             pair[0] = f32::from_bits(*id);
             pair[1] = (f64::from(*count) / f64::from(samples.max(1))) as f32;
         }

@@ -1,14 +1,14 @@
 //! The render delegate: a shot prepared once, its frames rendered one after the other.
 
-use super::buffers::{RenderBuffers, set_pixel};
+use super::buffers::RenderBuffers;
 use super::camera::CameraRays;
-use super::crop::Window;
+use super::film::{Film, Shown, half_of};
 use super::fog::Fog;
 use super::layers::Aov;
 use super::motion::Motion;
+use super::passes::{Control, Progress, Uniform};
 use super::path::{Integrator, PathScratch, TraceStats};
 use super::picker::LightPicker;
-use super::pixel::{PixelMean, Shown};
 use super::plan::{Plan, PlanError};
 use super::rays::RayScene;
 use super::settings::RenderSettings;
@@ -68,33 +68,6 @@ pub struct FrameStats {
     pub first_non_finite: Option<(u32, u32)>,
 }
 
-impl FrameStats {
-    /// Of two parts of a frame, the upper one first.
-    fn plus(self, below: FrameStats) -> FrameStats {
-        FrameStats {
-            trace: self.trace.plus(below.trace),
-            non_finite: self.non_finite + below.non_finite,
-            first_non_finite: self.first_non_finite.or(below.first_non_finite),
-        }
-    }
-}
-
-/// Receives the progress of a frame.
-pub trait Progress: Sync {
-    /// Some of the frame's rows are done.
-    fn rows_done(&self, rows: u64);
-
-    /// Whether the frame is to be given up. Asked often, from all threads.
-    fn is_stopped(&self) -> bool {
-        false
-    }
-}
-
-/// Ignores progress.
-impl Progress for () {
-    fn rows_done(&self, _: u64) {}
-}
-
 impl<'a> RenderDelegate<'a> {
     /// Prepares a shot.
     pub fn new(
@@ -152,8 +125,19 @@ impl<'a> RenderDelegate<'a> {
         }))
     }
 
-    /// Renders one frame, or the part of it that is to be rendered. The pixels depend on scene, tree,
-    /// settings and frame number alone; those of a part are the whole frame's.
+    /// A film for a frame that has no samples yet.
+    ///
+    /// # Errors
+    /// If the settings do not fit the scene.
+    pub fn film(&self) -> Result<Film, PlanError> {
+        let plan = self.plan.as_ref().map_err(Clone::clone)?;
+        let size = [self.settings.width, self.settings.height];
+        Ok(Film::new(size, plan, self.camera.exposure_scale))
+    }
+
+    /// Renders one frame, or the part of it that is to be rendered, with the same number of samples in
+    /// each pixel. The pixels depend on scene, tree, settings and frame number alone; those of a part
+    /// are the whole frame's.
     ///
     /// # Errors
     /// If the tree lacks the frame, the settings do not fit the scene, or `progress` stops it.
@@ -166,83 +150,104 @@ impl<'a> RenderDelegate<'a> {
         frame: i32,
         progress: &impl Progress,
     ) -> Result<RenderedFrame, RenderError> {
+        let mut control = Uniform(self.settings.samples);
+        self.expose(tree, frame, &mut self.film()?, &mut control, progress)
+    }
+
+    /// Exposes a film further, in the passes that a control asks for, and develops it. A film that has
+    /// samples must be of the same frame and settings; it then becomes what it would have become at
+    /// once. Where it is stopped, it has whole samples.
+    ///
+    /// # Errors
+    /// As [`render`](Self::render).
+    ///
+    /// # Panics
+    /// As [`at_frame`](Self::at_frame).
+    pub fn expose(
+        &self,
+        tree: &LightTree<impl AsRef<[u8]>>,
+        frame: i32,
+        film: &mut Film,
+        control: &mut dyn Control,
+        progress: &impl Progress,
+    ) -> Result<RenderedFrame, RenderError> {
         let plan = self.plan.as_ref().map_err(Clone::clone)?;
         self.at_frame(tree, frame, |integrator| {
-            self.render_with(integrator, plan, frame, progress)
+            let pose = integrator.emitters.pose;
+            let size = [self.settings.width, self.settings.height];
+            let motion = || Motion::new(self.scene, pose, &self.camera, frame, size);
+            let shown = Shown {
+                layers: &plan.layers,
+                origin: self.scene.origin,
+                motion: plan.layers.iter().any(|layer| layer.aov == Aov::Motion).then(motion),
+                ids: plan.ids.as_ref(),
+            };
+            let seed = hash(self.settings.seed, frame as u32);
+            loop {
+                if film.missing() > 0 {
+                    progress.expects(film.samples(), control.expected(film));
+                    let is_done = self.pass(integrator, &shown, seed, film, progress);
+                    control.passed(film);
+                    if !is_done && !control.is_done_if_stopped() {
+                        return Err(RenderError::Stopped);
+                    }
+                    if !is_done {
+                        break;
+                    }
+                }
+                match control.next(film) {
+                    Some(targets) => film.begin_pass(targets),
+                    None => break,
+                }
+            }
+            let mut buffers = film.develop(&shown);
+            buffers.manifest = plan.ids.as_ref().map(|ids| ids.manifest(self.scene, &buffers));
+            Ok(RenderedFrame { buffers, stats: film.stats() })
         })?
-        .ok_or(RenderError::Stopped)
     }
 
-    /// `None` if it was stopped.
-    fn render_with(
-        &self,
-        integrator: &Integrator,
-        plan: &Plan,
-        frame: i32,
-        progress: &impl Progress,
-    ) -> Option<RenderedFrame> {
-        let size = [self.settings.width, self.settings.height];
-        let shows_motion = plan.layers.iter().any(|layer| layer.aov == Aov::Motion);
-        let pose = integrator.emitters.pose;
-        let shown = Shown {
-            layers: &plan.layers,
-            exposure_scale: self.camera.exposure_scale.into(),
-            origin: self.scene.origin,
-            motion: shows_motion.then(|| Motion::new(self.scene, pose, &self.camera, frame, size)),
-            ids: plan.ids.as_ref(),
-        };
-        let frame_seed = hash(self.settings.seed, frame as u32);
-        let mut buffers = RenderBuffers::new(size, plan.window, plan.layers.clone());
-        let stats = buffers
-            .rows_mut()
-            .zip(plan.window.y0..plan.window.y1)
-            .map(|(row, y)| {
-                let stats = self.render_row(
-                    integrator,
-                    &shown,
-                    (frame_seed, plan.window, y),
-                    row,
-                    progress,
-                )?;
-                progress.rows_done(1);
-                Some(stats)
-            })
-            .try_reduce(FrameStats::default, |above, below| Some(above.plus(below)))?;
-        buffers.manifest = plan.ids.as_ref().map(|ids| ids.manifest(self.scene, &buffers));
-        Some(RenderedFrame { buffers, stats })
-    }
-
-    fn render_row(
+    /// Takes the samples that a film lacks. Whether it got that far before it was stopped.
+    fn pass(
         &self,
         integrator: &Integrator,
         shown: &Shown,
-        (frame_seed, window, y): (u32, Window, u32),
-        row: &mut [f32],
+        frame_seed: u32,
+        film: &mut Film,
         progress: &impl Progress,
-    ) -> Option<FrameStats> {
-        let (mut scratch, mut mean, mut values) =
-            (PathScratch::default(), PixelMean::default(), Vec::new());
-        let (mut stats, mut traced) = (FrameStats::default(), 0_u64);
-        for (at, x) in (window.x0..window.x1).enumerate() {
-            // A pixel's number is its place in the whole picture, so that a part of it has the same noise.
-            let seed = hash(frame_seed, y * self.settings.width + x);
-            mean.clear();
-            for index in 0..self.settings.samples {
-                if traced % SAMPLES_BETWEEN_STOPS == 0 && progress.is_stopped() {
-                    return None;
+    ) -> bool {
+        let window = film.window();
+        let rows = film.rows_mut().map(|(y, mut row)| {
+            let mut scratch = PathScratch::default();
+            let (mut since_asked, mut since_told) = (0, 0);
+            for (at, x) in (window.x0..window.x1).enumerate() {
+                // A pixel's number is its place in the whole picture, so that a part of it has the same noise.
+                let seed = hash(frame_seed, y * self.settings.width + x);
+                while let Some(sample) = row.next_sample(at) {
+                    if since_asked == 0 && progress.is_stopped() {
+                        progress.samples_taken(since_told);
+                        return (scratch.stats, false);
+                    }
+                    since_asked = (since_asked + 1) % SAMPLES_BETWEEN_STOPS;
+                    since_told += 1;
+                    let (seed, index) = scrambled(seed, sample);
+                    let path = integrator.trace(x, y, seed, index, &mut scratch);
+                    row.add(at, &path, &scratch.by_group, scratch.blocked, shown);
                 }
-                traced += 1;
-                let sample = integrator.trace(x, y, seed, index, &mut scratch);
-                mean.add(&sample, &scratch.by_group, shown);
             }
-            mean.finish(shown, &mut values);
-            set_pixel(row, window.width() as usize, at, &values);
-            if mean.non_finite > 0 {
-                stats.non_finite += u64::from(mean.non_finite);
-                stats.first_non_finite.get_or_insert((x, y));
-            }
-        }
-        stats.trace = scratch.stats;
-        Some(stats)
+            progress.samples_taken(since_told);
+            (scratch.stats, true)
+        });
+        let (trace, is_done) = rows.reduce(
+            || (TraceStats::default(), true),
+            |(a, a_done), (b, b_done)| (a.plus(b), a_done && b_done),
+        );
+        film.add_trace(trace);
+        is_done
     }
+}
+
+/// The sequence that a sample of a pixel belongs to, and its number there: see
+/// [`film`](super::film).
+fn scrambled(seed: u32, sample: u32) -> (u32, u32) {
+    (hash(seed, half_of(sample) as u32), sample / 2)
 }

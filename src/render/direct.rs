@@ -4,7 +4,7 @@ use super::path::{Integrator, PathScratch, Vertex};
 use super::picker::{LightPick, Wanted};
 use super::rays::Anchor;
 use crate::light_tree::Picked;
-use crate::math::color::Rgb;
+use crate::math::color::{Rgb, luminance};
 use crate::math::random::hash;
 use glam::{Vec2, Vec3};
 
@@ -25,7 +25,7 @@ pub struct Incoming {
 impl Integrator<'_> {
     /// What a vertex reflects of the lights that are picked for it. `u_pick` picks the lights, `u` samples
     /// points on them, and `salt` is a hash of the pixel and the bounce. `throughput` is the share of the
-    /// reflected light that gets to the eye: for the light groups alone, the result is without it.
+    /// reflected light that gets to the eye: for light groups and blocked light, the result is without it.
     pub(super) fn direct(
         &self,
         vertex: &Vertex,
@@ -36,7 +36,7 @@ impl Integrator<'_> {
         scratch: &mut PathScratch,
     ) -> Rgb {
         let mut sum = Rgb::ZERO;
-        let PathScratch { picks, stats, by_group, .. } = scratch;
+        let PathScratch { picks, stats, by_group, blocked, .. } = scratch;
         let several = self.picker.takes_several();
         self.picker.pick(wanted, u_pick, salt, picks, |pick| {
             stats.light_picks += 1;
@@ -49,7 +49,12 @@ impl Integrator<'_> {
                 return;
             }
             stats.rays += 1;
-            let light = reflected * self.arriving(&vertex.anchor, &incoming, accept);
+            let arriving = self.arriving(&vertex.anchor, &incoming, accept);
+            if arriving == Rgb::ZERO {
+                *blocked += f64::from(luminance(throughput * reflected)).powi(2);
+                return;
+            }
+            let light = reflected * arriving;
             self.count_in_group(pick.light, throughput * light, by_group);
             sum += light;
         });

@@ -8,6 +8,7 @@
 
 use super::beauty::half;
 use super::buffers::RenderBuffers;
+use super::crop::Window;
 use super::cryptomatte;
 use super::exr_header::sort_attributes;
 use super::layers::SampleType;
@@ -19,7 +20,7 @@ use exr::compression::Compression;
 use exr::meta::attribute::{AttributeValue, ChannelDescription, IntegerBounds, LineOrder, Text};
 use exr::meta::header::{Header, LayerAttributes};
 use exr::meta::{BlockDescription, MetaData};
-use exr::prelude::{SmallVec, Vec2};
+use exr::prelude::{ReadChannels, ReadLayers, SmallVec, Vec2, read};
 use std::io::{self, Cursor, Write};
 use std::path::Path;
 
@@ -88,6 +89,32 @@ pub fn read_metadata(path: &Path) -> Option<String> {
     let AttributeValue::Text(text) = attribute else { return None };
     let text = text.to_string();
     is_sealed(bytes).then_some(text)
+}
+
+/// A channel of a file, row after row, and which part of the whole picture it is of.
+///
+/// # Errors
+/// If the file cannot be read or has no such channel.
+pub fn read_channel(path: &Path, name: &str) -> io::Result<(Window, Vec<f32>)> {
+    let in_file = |error: String| io::Error::other(format!("{}: {error}", path.display()));
+    let image = read()
+        .no_deep_data()
+        .largest_resolution_level()
+        .all_channels()
+        .first_valid_layer()
+        .all_attributes()
+        .from_file(path)
+        .map_err(|error| in_file(error.to_string()))?;
+    let layer = image.layer_data;
+    let mut channels = layer.channel_data.list.into_iter();
+    let Some(channel) = channels.find(|channel| channel.name.to_string() == name) else {
+        return Err(in_file(format!("has no layer {name}; write it with --aov")));
+    };
+    let at = layer.attributes.layer_position;
+    let corner = [at.x(), at.y()].map(|edge| u32::try_from(edge).unwrap_or(0));
+    let [x1, y1] = [layer.size.width() as u32 + corner[0], layer.size.height() as u32 + corner[1]];
+    let values = channel.sample_data.values_as_f32().collect();
+    Ok((Window { x0: corner[0], y0: corner[1], x1, y1 }, values))
 }
 
 /// A JSON object with a blank seal as its first member.

@@ -189,7 +189,7 @@ impl Integrator<'_> {
         let segment = Segment { origin, direction, length };
         let wanted = Wanted::Along(segment, (lost / extinction) as f32);
         let mut sum = Rgb::ZERO;
-        let PathScratch { picks, stats, by_group, .. } = scratch;
+        let PathScratch { picks, stats, by_group, blocked, .. } = scratch;
         self.picker.pick(&wanted, u_pick, salt, picks, |pick| {
             stats.light_picks += 1;
             let place = f64::from(another(Vec2::new(u_place, 0.0), salt, pick.light).x);
@@ -206,7 +206,12 @@ impl Integrator<'_> {
             let turned = f64::from(fog.phase(incoming.direction, direction));
             let density = pick.probability * pdf * f64::from(incoming.pdf.unwrap_or(1.0));
             let weight = (turned / density) as f32;
-            let light = fog.scattering * fog.through(t) * arriving * incoming.radiance * weight;
+            let unblocked = fog.scattering * fog.through(t) * incoming.radiance * weight;
+            if arriving == Rgb::ZERO {
+                *blocked += f64::from(luminance(throughput * unblocked)).powi(2);
+                return;
+            }
+            let light = unblocked * arriving;
             self.count_in_group(pick.light, throughput * light, by_group);
             sum += light;
         });

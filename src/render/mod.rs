@@ -15,7 +15,8 @@
 //! | [`surface`] | what is there: normals, textures, material? |
 //! | [`bsdf`] | how does it reflect? |
 //! | [`layers`], [`light_groups`], [`crop`] | what is kept of a frame, of which lights, of which part? |
-//! | `pixel`, `parts` | what do a pixel's samples come to? |
+//! | [`film`], `parts` | what do a pixel's samples come to? |
+//! | [`passes`] | how many samples does each pixel get, and when is a frame done? |
 //! | `motion`, `cryptomatte` | where does it move, and what is it? |
 //! | [`buffers`] | where is it all kept? |
 //! | [`noise`] | what is the error of a picture, and where are samples missing? |
@@ -32,6 +33,7 @@ pub mod delegate;
 pub mod direct;
 pub mod exr;
 mod exr_header;
+pub mod film;
 pub mod fog;
 pub mod frame_names;
 pub mod frames;
@@ -40,9 +42,9 @@ pub mod light_groups;
 mod motion;
 pub mod noise;
 mod parts;
+pub mod passes;
 pub mod path;
 pub mod picker;
-mod pixel;
 mod plan;
 pub mod png;
 pub mod rays;
@@ -50,8 +52,10 @@ pub mod settings;
 pub mod surface;
 
 pub use crop::{CropError, Window};
-pub use delegate::{FrameStats, Progress, RenderDelegate, RenderError, RenderedFrame};
+pub use delegate::{FrameStats, RenderDelegate, RenderError, RenderedFrame};
+pub use film::Film;
 pub use layers::Aov;
 pub use light_groups::{LightGroupError, LightGroupRule};
+pub use passes::{Control, Progress};
 pub use plan::PlanError;
 pub use settings::{LightStrategy, RenderSettings, SplitBy};

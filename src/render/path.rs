@@ -119,6 +119,9 @@ pub struct PathScratch {
     lights: Vec<SeenLight>,
     /// Light of the last path towards the eye by light group, nits; empty unless that is asked for.
     pub by_group: Vec<Rgb>,
+    /// Sum of the squared luminance of what the last path would have got from lights that were picked
+    /// and found to be blocked.
+    pub blocked: f64,
     /// What it cost so far.
     pub stats: TraceStats,
 }
@@ -140,6 +143,7 @@ impl Integrator<'_> {
             self.camera.ray(x, y, Vec2::new(px, py), Vec2::new(lx, ly));
         let accept = self.cutouts(hash(seed, index));
         let mut seen = PathSample { direction, ..Default::default() };
+        scratch.blocked = 0.0;
         scratch.by_group.clear();
         scratch.by_group.resize(self.groups.map_or(0, |groups| groups.names().len()), Rgb::ZERO);
         let mut throughput = Rgb::ONE;

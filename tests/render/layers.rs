@@ -399,8 +399,6 @@ fn samples_that_are_not_finite_are_left_out_counted_and_located() {
 struct Patience(AtomicU64, u64);
 
 impl Progress for Patience {
-    fn rows_done(&self, _: u64) {}
-
     fn is_stopped(&self) -> bool {
         self.0.fetch_add(1, Ordering::Relaxed) >= self.1
     }

@@ -1,9 +1,10 @@
 //! The command line.
 
 use crate::display::Progress;
-use candelabra::pipeline::{Preview, RenderJob, Strict, View, option};
+use candelabra::pipeline::{Effort, Preview, RenderJob, Strict, View, option};
 use candelabra::render::frame_names::FrameNames;
 use candelabra::render::frames::Frames;
+use candelabra::render::noise::Grey;
 use candelabra::render::{Aov, LightGroupRule, LightStrategy, RenderSettings, SplitBy, Window};
 use candelabra::scene::Medium;
 use clap::{Parser, ValueEnum};
@@ -29,9 +30,29 @@ pub struct Arguments {
     /// percent sign; folders are taken as they are written
     #[arg(short, long, value_parser = pictures)]
     pub output: FrameNames,
-    /// Samples of each pixel
-    #[arg(long, default_value_t = 64, value_parser = clap::value_parser!(u32).range(1..))]
-    pub spp: u32,
+    /// The error that a frame may have: draft (0.1), preview (0.05), final (0.02), or a number. Noise as a
+    /// share of the light, or of the grey floor where it is darker; samples then go where it is
+    #[arg(long, value_parser = option::error)]
+    pub error: Option<f64>,
+    /// How long a frame may take: 90, 90s, 10m or 1.5h, from the start of the program
+    #[arg(long, value_parser = option::duration)]
+    pub time: Option<f64>,
+    /// Samples of each pixel; with --error or --time the most that any pixel gets. 64 if nothing is asked for
+    #[arg(long, visible_alias = "max-spp", value_parser = clap::value_parser!(u32).range(1..))]
+    pub spp: Option<u32>,
+    /// Repeat the numbers of samples of earlier pictures, pixel by pixel, such as out/street.####.exr
+    #[arg(long, value_name = "PICTURES", value_parser = pictures, conflicts_with_all = ["error", "time", "spp"])]
+    pub plan: Option<FrameNames>,
+    /// The grey floor: the luminance in the picture below which error is absolute; if not given, a tenth of
+    /// the shot's middle
+    #[arg(long, value_name = "LUMINANCE", value_parser = option::grey)]
+    pub grey: Option<Grey>,
+    /// Render so many pixels of each frame again, with 16 times the samples, and say how far off its error is
+    #[arg(long, value_name = "PIXELS", value_parser = clap::value_parser!(u32).range(2..))]
+    pub audit: Option<u32>,
+    /// Keep a frame in the making beside its picture after each pass, and go on with one that is there
+    #[arg(long)]
+    pub checkpoint: bool,
     /// Bounces of light to the eye: 0 shows emitters only, 1 adds direct light
     #[arg(long, default_value_t = 5)]
     pub depth: u32,
@@ -158,6 +179,9 @@ impl Arguments {
             view: self.view.clone(),
             size: self.res,
             settings: self.settings(),
+            effort: self.effort(),
+            audit: self.audit,
+            checkpoint: self.checkpoint,
             fog: self.fog.clone(),
             force_lights: self.force_light.clone(),
             preview: self.png.then_some(Preview { exposure: self.exposure }),
@@ -177,9 +201,20 @@ impl Arguments {
         aovs
     }
 
+    fn effort(&self) -> Effort {
+        let looks = self.error.is_some() || self.time.is_some();
+        let samples = if looks { Effort::MOST } else { RenderSettings::default().samples };
+        Effort {
+            error: self.error,
+            seconds: self.time,
+            samples: self.spp.unwrap_or(samples),
+            plan: self.plan.clone(),
+            grey: self.grey,
+        }
+    }
+
     fn settings(&self) -> RenderSettings {
         RenderSettings {
-            samples: self.spp,
             depth: self.depth,
             seed: self.seed,
             strategy: match self.light_sampler {

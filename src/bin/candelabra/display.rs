@@ -3,7 +3,7 @@
 use crate::stderr::say;
 use crate::stop::Stop;
 use candelabra::page::Plain;
-use candelabra::pipeline::{Event, Watch};
+use candelabra::pipeline::{Audit, Event, FrameNoise, Watch};
 use clap::{Args, ValueEnum};
 use indicatif::{ProgressBar, ProgressStyle};
 use std::io::{IsTerminal, Write};
@@ -227,15 +227,40 @@ impl Shared {
 /// What a person reads of an event.
 fn line_of(event: &Event) -> Option<String> {
     match event {
-        Event::FrameDone { frame, seconds, rays, light_picks, output } => Some(format!(
+        Event::FrameDone { frame, seconds, rays, light_picks, noise, output } => Some(format!(
             "frame {frame}: {seconds:.2} s, {:.2} million rays a second, {light_picks} light picks \
-             -> {}",
+             -> {}{}",
             *rays as f64 / seconds / 1e6,
-            output.display()
+            output.display(),
+            noise.map(|noise| format!("\n{}", told(&noise))).unwrap_or_default(),
         )),
         Event::UpToDate { frame: Some(frame), output } => {
             Some(format!("frame {frame}: {} is up to date", output.display()))
         }
         _ => None,
     }
+}
+
+/// What a person reads of a frame's noise.
+fn told(noise: &FrameNoise) -> String {
+    let FrameNoise { error, bound, decibels, samples, most, capped, spoilt, .. } = *noise;
+    let asked = noise.asked.map(|asked| format!("{asked} asked; ")).unwrap_or_default();
+    let mut text = format!(
+        "  error {asked}{error:.4}, at most {bound:.4} with 95 % certainty ({decibels:.1} dB); \
+         {samples:.0} samples a pixel, {most} at most"
+    );
+    if capped > 0 {
+        text +=
+            &format!("; {capped} pixels have as many as they may and are not settled (--max-spp)");
+    }
+    if spoilt > 0 {
+        text += &format!("; {spoilt} pixels cannot be judged: samples were infinite or no number");
+    }
+    if let Some(Audit { pixels, error, from, to }) = noise.audit {
+        text += &format!(
+            "\n  audit: {error:.4}, {from:.4} to {to:.4} with 95 % certainty, by {pixels} pixels \
+             rendered again"
+        );
+    }
+    text
 }

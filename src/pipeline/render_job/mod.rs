@@ -10,16 +10,23 @@
 //! others. The picture of a frame depends on the job and on that frame alone, not on which other frames this
 //! process renders, nor on how often it was stopped before.
 
+mod ahead;
+mod checkpoint;
 mod clock;
+mod control;
+mod effort;
 mod error;
-mod exposure;
+mod frame_noise;
 mod outputs;
 mod pass;
+mod plan;
 mod report;
 mod shot;
 mod writer;
 
+pub use effort::{Effort, Quality};
 pub use error::RenderError;
+pub use frame_noise::{Audit, FrameNoise};
 pub use report::{FrameCounts, RenderReport, SceneCounts, Seconds};
 
 use super::{Event, PreviewStamp, Stamp, Strict, TreeChoice, View, Watch, with_trees};
@@ -32,6 +39,7 @@ use outputs::Outputs;
 use pass::Pass;
 use shot::Shot;
 use std::path::PathBuf;
+use std::sync::atomic::AtomicU64;
 use writer::{Writer, Writing};
 
 /// A shot to be rendered.
@@ -49,8 +57,14 @@ pub struct RenderJob {
     pub view: View,
     /// Columns and rows; if not given, [`HEIGHT`](Self::HEIGHT) rows in the camera's shape.
     pub size: Option<(u32, u32)>,
-    /// The other knobs. Their size is not used.
+    /// The other knobs. Their size and number of samples are not used.
     pub settings: RenderSettings,
+    /// How much work goes into each frame.
+    pub effort: Effort,
+    /// Render so many pixels of each frame again, with more samples, to see how far off it is.
+    pub audit: Option<u32>,
+    /// Keep frames in the making on the disk, and go on with those that are there.
+    pub checkpoint: bool,
     /// Fog in the place of the scene's own.
     pub fog: Option<Medium>,
     /// Paths of lights to be forced, beside those that the scene forces.
@@ -115,7 +129,9 @@ impl RenderJob {
             with_trees(&shot.scene, &choice, &textures, |emitters, trees| {
                 clock.lap(|seconds| &mut seconds.trees);
                 let counts = shot.count(emitters, &trees);
-                let writing = Writing { job: self, outputs: &outputs, watch };
+                let nanoseconds = AtomicU64::new(0);
+                let writing =
+                    Writing { job: self, outputs: &outputs, watch, nanoseconds: &nanoseconds };
                 let (frames, written) = std::thread::scope(|scope| {
                     let writer = Writer::start(scope, writing);
                     let pass = Pass::new(self, &shot, emitters, trees, &outputs, watch, &mut clock);

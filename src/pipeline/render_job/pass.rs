@@ -1,18 +1,26 @@
 //! Frame after frame.
 
-use super::clock::Clock;
+use super::ahead::{Glimpse, glimpse, middle};
+use super::checkpoint::Checkpoint;
+use super::clock::{Clock, Deadline};
+use super::control::FrameControl;
+use super::frame_noise::{FrameNoise, audit};
 use super::outputs::Outputs;
+use super::plan::read_counts;
 use super::report::FrameCounts;
 use super::shot::Shot;
 use super::writer::{Finished, Writer, write_preview};
-use super::{RenderError, RenderJob, exposure};
+use super::{RenderError, RenderJob};
 use crate::emitter::Emitters;
 use crate::pipeline::{
     Event, PreviewStamp, ShotTrees, Stamp, Stamper, TreeError, Watch, frames_of,
 };
 use crate::render::beauty::Beauty;
-use crate::render::{self, PlanError, Progress, RenderDelegate};
+use crate::render::noise::Grey;
+use crate::render::{self, Progress, RenderDelegate};
+use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
+use std::time::{Duration, Instant};
 
 /// One pass over the frames of a shot.
 pub(super) struct Pass<'a> {
@@ -26,11 +34,11 @@ pub(super) struct Pass<'a> {
     clock: &'a mut Clock,
     /// Prepared when the first frame needs it: a shot that is done resumes at once.
     delegate: Option<RenderDelegate<'a>>,
-    /// Stops of all previews of the shot, once they are needed.
-    exposure: Option<f32>,
-    /// Rows of a frame's window.
-    height: u64,
-    rows: Rows<'a>,
+    /// Small pictures of frames, made when they are needed.
+    glimpses: BTreeMap<i32, Glimpse>,
+    progress: FrameProgress<'a>,
+    /// Frames that were rendered, for their share of the time.
+    rendered: u32,
 }
 
 /// What became of a frame that did not fail.
@@ -84,10 +92,10 @@ impl<'a> Pass<'a> {
         clock: &'a mut Clock,
     ) -> Result<Pass<'a>, RenderError> {
         let rest = (&job.fog, &job.force_lights, job.verify);
-        let stamper = Stamper::new(&shot.scene, &shot.camera, &shot.settings, rest);
+        let knobs = (&shot.settings, &job.effort);
+        let stamper = Stamper::new(&shot.scene, &shot.camera, knobs, rest);
         shot.settings.check(&shot.scene, emitters)?;
-        let height = shot.settings.window().map_err(PlanError::from)?.height().into();
-        let rows = height * shot.frames.as_slice().len() as u64;
+        let frames = shot.frames.as_slice().len();
         Ok(Pass {
             job,
             shot,
@@ -98,9 +106,9 @@ impl<'a> Pass<'a> {
             watch,
             clock,
             delegate: None,
-            exposure: None,
-            height,
-            rows: Rows { watch, all: rows, done: AtomicU64::new(0), frame: 0 },
+            glimpses: BTreeMap::new(),
+            progress: FrameProgress::new(watch, frames),
+            rendered: 0,
         })
     }
 
@@ -112,8 +120,7 @@ impl<'a> Pass<'a> {
         let frames = self.shot.frames.as_slice();
         let mut counts = FrameCounts { asked: frames.len(), ..FrameCounts::default() };
         for &frame in frames {
-            let before = self.rows.done.load(Relaxed);
-            self.rows.frame = frame;
+            self.progress.frame = frame;
             let outcome = match self.watch.is_stopped() {
                 true => Err(Trouble::Stopped),
                 false => self.render(frame, writer),
@@ -128,76 +135,146 @@ impl<'a> Pass<'a> {
                     self.watch.tell(Event::FrameFailed { frame, why });
                 }
             }
-            self.rows.done.store(before, Relaxed);
-            self.rows.rows_done(self.height);
+            self.progress.frame_is_over();
         }
         Ok(counts)
     }
 
     fn render(&mut self, frame: i32, writer: &Writer) -> Result<Outcome, Trouble> {
-        if self.job.resume && self.is_up_to_date(frame)? {
+        let plan = self.plan(frame)?;
+        if self.job.resume && self.is_up_to_date(frame, plan.as_deref())? {
             let output = self.outputs.picture(frame);
             self.watch.tell(Event::UpToDate { frame: Some(frame), output });
             return Ok(Outcome::UpToDate);
         }
         self.outputs.check_frame(frame)?;
         let exposure = self.exposure()?;
-        let stamp = self.stamp(frame)?;
-        let Pass { delegate, shot, emitters, trees, rows, watch, clock, .. } = self;
+        let grey = self.grey()?;
+        let stamp = self.stamp(frame, plan.as_deref())?;
+        let deadline = self.deadline(writer);
+        self.progress.until = deadline.as_ref().map(Deadline::latest);
+
+        let Pass { job, delegate, shot, emitters, trees, progress, watch, clock, .. } = self;
         let delegate = prepared(delegate, shot, emitters, *watch, clock);
         let tree = trees.for_frame(frame)?;
         clock.lap(|seconds| &mut seconds.trees);
-        let rendered = delegate.render(&tree, frame, &*rows)?;
+        let picture = self.outputs.picture(frame);
+        let mut film = delegate.film().map_err(render::RenderError::from)?;
+        let checkpoint = job.checkpoint.then(|| Checkpoint::of(&picture, &stamp, *watch));
+        if let Some(checkpoint) = &checkpoint {
+            film = checkpoint.restore(film);
+        }
+        let leftover = checkpoint.as_ref().map(|own| own.path().to_path_buf());
+        let mut control = FrameControl::new(&job.effort, plan, grey, deadline, checkpoint);
+        let rendered = delegate.expose(&tree, frame, &mut film, &mut control, &*progress)?;
+        let reached = control.reached();
         let seconds = clock.lap(|seconds| &mut seconds.rendering);
+        let mut noise = FrameNoise::of(&film, grey, job.effort.error, reached);
+        if let (Some(pixels), Some(grey), Some(noise)) = (job.audit, grey, &mut noise) {
+            let audited =
+                audit(delegate, &tree, frame, (&film, grey), &shot.settings, (pixels, &*progress))?;
+            delegate.set_settings(shot.settings.clone());
+            noise.audit = Some(audited);
+            clock.lap(|seconds| &mut seconds.audit);
+        }
+        let stamp = Stamp { noise, ..stamp };
         trees.check_unwritten()?;
-        let is_taken = writer.hand_over(Finished { rendered, stamp, seconds, exposure });
+        self.rendered += 1;
+        let finished = Finished { rendered, stamp, seconds, exposure, leftover };
+        let is_taken = writer.hand_over(finished);
         self.clock.lap(|seconds| &mut seconds.waiting);
         if is_taken { Ok(Outcome::HandedOver) } else { Err(Trouble::Stopped) }
+    }
+
+    /// The counts of the pixels of a frame, if they are planned.
+    fn plan(&self, frame: i32) -> Result<Option<Vec<u32>>, Trouble> {
+        let Some(names) = &self.job.effort.plan else { return Ok(None) };
+        let path = names.path(frame);
+        let counts = read_counts(&path)?;
+        let window =
+            self.shot.settings.window().map_err(|error| Trouble::OfFrame(error.to_string()))?;
+        if counts.window != window {
+            return Err(Trouble::OfFrame(format!(
+                "{}: has other pixels than the picture to be rendered; give its size and crop, or \
+                 leave --plan out",
+                path.display()
+            )));
+        }
+        Ok(Some(counts.of_pixels))
+    }
+
+    /// When the next frame is to be done, if that is asked for.
+    fn deadline(&self, writer: &Writer) -> Option<Deadline> {
+        let each = self.job.effort.seconds?;
+        let all = Duration::try_from_secs_f64(each * f64::from(self.rendered + 1)).ok()?;
+        Some(Deadline::new(self.clock.started() + all, each, writer.seconds_of_a_frame()))
     }
 
     /// Stops of previews, if there are any.
     fn exposure(&mut self) -> Result<Option<f32>, Trouble> {
         let Some(preview) = self.job.preview else { return Ok(None) };
-        if let Some(stops) = preview.exposure.or(self.exposure) {
-            return Ok(Some(stops));
+        match preview.exposure {
+            Some(stops) => Ok(Some(stops)),
+            None => Ok(Some(self.glimpse(frames_of(&self.shot.scene)[0])?.exposure)),
         }
-        let Pass { delegate, shot, emitters, trees, watch, clock, .. } = self;
-        let delegate = prepared(delegate, shot, emitters, *watch, clock);
-        let frame = frames_of(&shot.scene)[0];
-        let stops = match trees.for_frame(frame) {
-            // The file may be of other frames; the exposure is the same all the same.
-            Err(TreeError::NoSuchFrame { .. }) => {
-                let mut own = ShotTrees::built(&shot.scene, emitters)?;
-                exposure::of_frame(shot, delegate, &own.for_frame(frame)?, frame, *watch)
-            }
-            tree => exposure::of_frame(shot, delegate, &tree?, frame, *watch),
-        }?;
-        self.clock.lap(|seconds| &mut seconds.exposure);
-        self.exposure = Some(stops);
-        Ok(self.exposure)
     }
 
-    fn stamp(&mut self, frame: i32) -> Result<Stamp, Trouble> {
+    /// The grey floor of the shot, if the noise of its frames is looked at.
+    fn grey(&mut self) -> Result<Option<Grey>, Trouble> {
+        let effort = &self.job.effort;
+        if effort.grey.is_some() || !(effort.looks() || self.job.audit.is_some()) {
+            return Ok(effort.grey);
+        }
+        let frames = frames_of(&self.shot.scene);
+        let mut seen = [frames[0], frames[frames.len() / 2], frames[frames.len() - 1]].to_vec();
+        seen.dedup();
+        for &frame in &seen {
+            self.glimpse(frame)?;
+        }
+        let glimpses = seen.iter().filter_map(|frame| self.glimpses.get(frame));
+        Ok(Some(Grey::below(middle(glimpses))))
+    }
+
+    /// A small picture of a frame.
+    fn glimpse(&mut self, frame: i32) -> Result<&Glimpse, Trouble> {
+        if !self.glimpses.contains_key(&frame) {
+            let Pass { delegate, shot, emitters, trees, watch, clock, .. } = self;
+            let delegate = prepared(delegate, shot, emitters, *watch, clock);
+            let seen = match trees.for_frame(frame) {
+                // The file may be of other frames; the picture is the same all the same.
+                Err(TreeError::NoSuchFrame { .. }) => {
+                    let mut own = ShotTrees::built(&shot.scene, emitters)?;
+                    glimpse(shot, delegate, &own.for_frame(frame)?, frame, *watch)
+                }
+                tree => glimpse(shot, delegate, &tree?, frame, *watch),
+            }?;
+            self.clock.lap(|seconds| &mut seconds.ahead);
+            self.glimpses.insert(frame, seen);
+        }
+        Ok(&self.glimpses[&frame])
+    }
+
+    fn stamp(&mut self, frame: i32, plan: Option<&[u32]>) -> Result<Stamp, Trouble> {
         let tree = self.trees.for_frame(frame)?;
         let digest = tree.digest_at(frame).map_err(render::RenderError::from)?;
-        let stamp = self.stamper.stamp(frame, digest);
+        let stamp = self.stamper.stamp(frame, plan, digest);
         self.clock.lap(|seconds| &mut seconds.trees);
         Ok(stamp)
     }
 
     /// Whether a frame's picture is there, whole and of the same. Then a preview that is not is made again
     /// from it.
-    fn is_up_to_date(&mut self, frame: i32) -> Result<bool, Trouble> {
+    fn is_up_to_date(&mut self, frame: i32, plan: Option<&[u32]>) -> Result<bool, Trouble> {
         let picture = self.outputs.picture(frame);
         let earlier = Stamp::of_picture(&picture);
         self.clock.lap(|seconds| &mut seconds.resume);
-        let fingerprint = self.stamper.fingerprint(frame);
+        let fingerprint = self.stamper.fingerprint(frame, plan);
         // The tree is looked at only if all else is the same.
         let Some(earlier) = earlier.filter(|stamp| stamp.fingerprint == fingerprint) else {
             return Ok(false);
         };
-        let stamp = self.stamp(frame)?;
-        if earlier != stamp {
+        let stamp = self.stamp(frame, plan)?;
+        if !earlier.is_of_same(&stamp) {
             return Ok(false);
         }
         let Some(preview) = self.outputs.preview(frame) else { return Ok(true) };
@@ -230,22 +307,49 @@ fn prepared<'d, 'a>(
     })
 }
 
-/// Counts rows of pixels over all frames.
-struct Rows<'a> {
+/// How far a shot is: frames, and the samples of the one that is rendered.
+struct FrameProgress<'a> {
     watch: &'a dyn Watch,
-    all: u64,
-    done: AtomicU64,
+    frames: usize,
+    over: usize,
     frame: i32,
+    /// When the frame is interrupted.
+    until: Option<Instant>,
+    taken: AtomicU64,
+    all: AtomicU64,
 }
 
-impl Progress for Rows<'_> {
-    fn rows_done(&self, rows: u64) {
-        let done = self.done.fetch_add(rows, Relaxed) + rows;
-        let done = done as f64 / self.all.max(1) as f64;
+impl FrameProgress<'_> {
+    fn new(watch: &dyn Watch, frames: usize) -> FrameProgress<'_> {
+        let (taken, all) = (AtomicU64::new(0), AtomicU64::new(1));
+        FrameProgress { watch, frames, over: 0, frame: 0, until: None, taken, all }
+    }
+
+    fn frame_is_over(&mut self) {
+        self.over += 1;
+        self.until = None;
+        self.expects(0, 1);
+    }
+
+    fn tell(&self, share_of_frame: f64) {
+        let done = (self.over as f64 + share_of_frame.min(1.0)) / self.frames.max(1) as f64;
         self.watch.tell(Event::Progress { done, frame: Some(self.frame) });
+    }
+}
+
+impl Progress for FrameProgress<'_> {
+    fn expects(&self, taken: u64, all: u64) {
+        self.taken.store(taken, Relaxed);
+        self.all.store(all.max(1), Relaxed);
+        self.tell(taken as f64 / all.max(1) as f64);
+    }
+
+    fn samples_taken(&self, samples: u64) {
+        let taken = self.taken.fetch_add(samples, Relaxed) + samples;
+        self.tell(taken as f64 / self.all.load(Relaxed) as f64);
     }
 
     fn is_stopped(&self) -> bool {
-        self.watch.is_stopped()
+        self.watch.is_stopped() || self.until.is_some_and(|until| Instant::now() >= until)
     }
 }

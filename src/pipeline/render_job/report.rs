@@ -45,10 +45,12 @@ pub struct Seconds {
     pub rays: f64,
     /// Looking for pictures that are there already.
     pub resume: f64,
-    /// Choosing the exposure of previews.
-    pub exposure: f64,
+    /// Looking at small pictures of the shot, for exposure and grey floor.
+    pub ahead: f64,
     /// Rendering frames.
     pub rendering: f64,
+    /// Rendering pixels again, to audit the error.
+    pub audit: f64,
     /// Writing pictures and previews, while the next frame is rendered.
     pub writing: f64,
     /// Waiting for a picture to be written before the next can be handed over.

@@ -30,7 +30,8 @@ impl Shot {
         let camera = found.camera;
         let shape = || option::size_of(camera.aspect.unwrap_or(ASPECT), RenderJob::HEIGHT);
         let (width, height) = job.size.unwrap_or_else(shape);
-        let settings = RenderSettings { width, height, ..job.settings.clone() };
+        let samples = job.effort.samples;
+        let settings = RenderSettings { width, height, samples, ..job.settings.clone() };
         Ok(Shot { scene, camera, frames, settings })
     }
 

@@ -10,8 +10,10 @@ use crate::render::exr::write_exr;
 use crate::render::path::TraceStats;
 use crate::render::png::write_png;
 use crate::store::is_full;
+use std::fs;
 use std::io;
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::thread::{Scope, ScopedJoinHandle};
 use std::time::Instant;
@@ -24,6 +26,8 @@ pub(super) struct Finished {
     pub seconds: f64,
     /// Stops of its preview, if it has one.
     pub exposure: Option<f32>,
+    /// Its checkpoint, which goes when the picture is there.
+    pub leftover: Option<PathBuf>,
 }
 
 /// How pictures are written.
@@ -31,6 +35,8 @@ pub(super) struct Writing<'a> {
     pub job: &'a RenderJob,
     pub outputs: &'a Outputs<'a>,
     pub watch: &'a dyn Watch,
+    /// How long writing a frame took last, nanoseconds.
+    pub nanoseconds: &'a AtomicU64,
 }
 
 /// What a writer did.
@@ -47,6 +53,7 @@ pub(super) struct Written {
 pub(super) struct Writer<'scope> {
     sender: SyncSender<Finished>,
     thread: ScopedJoinHandle<'scope, Written>,
+    nanoseconds: &'scope AtomicU64,
 }
 
 impl<'scope> Writer<'scope> {
@@ -55,7 +62,13 @@ impl<'scope> Writer<'scope> {
         writing: Writing<'a>,
     ) -> Writer<'scope> {
         let (sender, receiver) = sync_channel(0);
-        Writer { sender, thread: scope.spawn(move || writing.write_all(&receiver)) }
+        let nanoseconds = writing.nanoseconds;
+        Writer { sender, thread: scope.spawn(move || writing.write_all(&receiver)), nanoseconds }
+    }
+
+    /// How long it takes to write a frame: as long as the last one took, in seconds.
+    pub fn seconds_of_a_frame(&self) -> f64 {
+        self.nanoseconds.load(Relaxed) as f64 * 1e-9
     }
 
     /// Hands over a frame. Waits until the one before is written. Whether it was taken: only a panic ends the
@@ -90,13 +103,15 @@ impl Writing<'_> {
                     self.watch.tell(Event::FrameFailed { frame: frame.stamp.frame, why });
                 }
             }
-            written.seconds += started.elapsed().as_secs_f64();
+            let elapsed = started.elapsed();
+            self.nanoseconds.store(elapsed.as_nanos() as u64, Relaxed);
+            written.seconds += elapsed.as_secs_f64();
         }
         written
     }
 
     fn write(&self, frame: &Finished) -> io::Result<()> {
-        let Finished { rendered, stamp, seconds, exposure } = frame;
+        let Finished { rendered, stamp, seconds, exposure, leftover } = frame;
         if let Some((x, y)) = rendered.stats.first_non_finite {
             let text = format!(
                 "frame {}: {} samples were infinite or no number and were left out, the first in pixel \
@@ -121,11 +136,14 @@ impl Writing<'_> {
             let beauty = Beauty::of(&rendered.buffers, self.job.settings.float_beauty);
             write_preview(&preview, &beauty, *stops, &self.job.preview_stamp(stamp))?;
         }
+        // Nothing is lost if it stays: it is of a picture that is there.
+        leftover.iter().for_each(|path| drop(fs::remove_file(path)));
         self.watch.tell(Event::FrameDone {
             frame: stamp.frame,
             seconds: *seconds,
             rays: rendered.stats.trace.rays,
             light_picks: rendered.stats.trace.light_picks,
+            noise: stamp.noise,
             output,
         });
         Ok(())

@@ -10,6 +10,7 @@
 
 use super::estimate::Estimate;
 use crate::math::random::hash;
+use rayon::prelude::*;
 
 /// Samples of each pixel.
 pub type Counts = Vec<u32>;
@@ -23,8 +24,8 @@ pub struct Allotment {
     pub most: u32,
 }
 
-/// A place may have so many times the error of the frame.
-const WORST: f64 = 2.0;
+/// A place may have so many times the squared error of the frame.
+const WORST2: f64 = 4.0;
 /// In one pass a pixel's samples at most become so many times as many: its error is not known well
 /// enough for more.
 const GROWTH: f64 = 2.0;
@@ -34,35 +35,41 @@ impl Allotment {
     /// judged get the most. `error` is asked of the frame.
     pub fn needed(&self, estimate: &Estimate, error: f64) -> Vec<f64> {
         let wanted = error * error;
-        let pixels = 0..estimate.pixels();
-        let noisy: Vec<f64> = pixels
-            .filter(|&i| estimate.is_noisy(i))
+        let noisy: Vec<f64> = (0..estimate.pixels())
+            .filter(|&i| estimate.is_noisy(i) && !estimate.is_spoilt(i))
             .map(|i| estimate.of_one_sample(i))
             .filter(|r| r.is_finite())
             .collect();
-        let reached = |scale: f64| {
-            let own = |&r: &f64| r / self.samples_for(r, scale, wanted);
-            noisy.iter().map(own).sum::<f64>() <= wanted * noisy.len() as f64
-        };
-        // The samples are `scale` times the root of r; bisected over all decades.
-        let (mut low, mut high) = (-40.0_f64, 40.0_f64);
-        for _ in 0..60 {
-            let middle = 0.5 * (low + high);
-            *(if reached(middle.exp2()) { &mut high } else { &mut low }) = middle;
-        }
-        let scale = high.exp2();
-        (0..estimate.pixels())
-            .map(|i| match estimate.of_one_sample(i) {
-                _ if estimate.is_spoilt(i) => self.most.into(),
-                r if r.is_finite() => self.samples_for(r, scale, wanted),
-                _ => self.most.into(),
-            })
-            .collect()
+        let count = |r: f64, scale: f64| self.clamp((scale * r.sqrt()).max(r / (WORST2 * wanted)));
+        let enough = wanted * noisy.len() as f64;
+        let scale =
+            least_scale(|scale| noisy.iter().map(|&r| r / count(r, scale)).sum::<f64>() <= enough);
+        self.each(estimate, |_, r| count(r, scale))
     }
 
-    fn samples_for(&self, r: f64, scale: f64, wanted: f64) -> f64 {
-        let neyman = scale * r.sqrt();
-        neyman.max(r / (WORST * WORST * wanted)).clamp(self.least.into(), self.most.into())
+    /// The best use of so many samples in all, those that were taken counted.
+    pub fn affordable(&self, estimate: &Estimate, samples: u64) -> Vec<f64> {
+        let all = samples as f64;
+        let at = |scale: f64| {
+            let pixels =
+                self.each(estimate, |i, r| self.clamp(scale * r.sqrt()).max(estimate.samples(i)));
+            (pixels.iter().sum::<f64>(), pixels)
+        };
+        let scale = least_scale(|scale| at(scale).0 >= all);
+        at(scale).1
+    }
+
+    /// A count for each pixel, from the squared error of one sample; those without one get the most.
+    fn each(&self, estimate: &Estimate, count: impl Fn(usize, f64) -> f64 + Sync) -> Vec<f64> {
+        let of = |i: usize| match estimate.of_one_sample(i) {
+            r if r.is_finite() && !estimate.is_spoilt(i) => count(i, r),
+            _ => self.most.into(),
+        };
+        (0..estimate.pixels()).into_par_iter().map(of).collect()
+    }
+
+    fn clamp(&self, count: f64) -> f64 {
+        count.clamp(self.least.into(), self.most.into())
     }
 
     /// The counts of the next pass towards what is needed: never fewer than there are, and not many more
@@ -78,8 +85,18 @@ impl Allotment {
     }
 }
 
-/// A fixed number in `[0, 1)` for each pixel.
-fn mask(pixel: usize, width: usize) -> f64 {
+/// The least scale at which something is enough that grows with it; bisected over many decades.
+fn least_scale(is_enough: impl Fn(f64) -> bool) -> f64 {
+    let (mut low, mut high) = (-60.0_f64, 60.0_f64);
+    while high - low > 1e-3 {
+        let middle = 0.5 * (low + high);
+        *(if is_enough(middle.exp2()) { &mut high } else { &mut low }) = middle;
+    }
+    high.exp2()
+}
+
+/// A fixed number in `[0, 1)` for each pixel, by its place in a picture of a width.
+pub fn mask(pixel: usize, width: usize) -> f64 {
     let word = hash((pixel % width) as u32, !((pixel / width) as u32));
     f64::from(word) / 4_294_967_296.0
 }

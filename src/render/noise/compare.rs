@@ -1,7 +1,6 @@
 //! How far off a picture is from a converged one.
 
-use super::Grey;
-use super::tent::around;
+use super::{Grey, pool};
 use serde::Serialize;
 
 /// A picture to compare with, and what its own noise is.
@@ -46,9 +45,8 @@ impl Reference {
         }
         let mean = noisy.iter().map(|&i| squares[i]).sum::<f64>() / noisy.len() as f64;
         let error = mean.max(0.0).sqrt();
-        let sums = around(&squares.iter().map(|s| s.max(0.0)).collect::<Vec<_>>(), self.width, 1.0);
-        let weights = around(&vec![1.0; squares.len()], self.width, 1.0);
-        let mut pooled: Vec<f64> = noisy.iter().map(|&i| sums[i] / weights[i]).collect();
+        let around = pool(&squares, self.width);
+        let mut pooled: Vec<f64> = noisy.iter().map(|&i| around[i].max(0.0)).collect();
         pooled.sort_unstable_by(f64::total_cmp);
         let sum = |values: &[f64]| values.iter().sum::<f64>();
         Compared {

@@ -67,8 +67,9 @@ pub struct FrameError {
 
 /// The frame is divided into so many interleaved lattices, whose spread tells how sure its error is.
 const LATTICES: [usize; 2] = [8, 4];
-/// Quantile of Student's t with 31 degrees of freedom, 95 %.
-const T_95: f64 = 1.696;
+/// Quantile of Student's t with 31 degrees of freedom: 97.5 %, so that two looks at a frame that is about to
+/// be done are wrong once in twenty times.
+const T: f64 = 2.040;
 
 impl Estimate {
     /// Of pixels, row after row.
@@ -162,7 +163,7 @@ impl Estimate {
         let uncertainty = (spread * lattices / (lattices - 1.0)).sqrt() / noisy;
         FrameError {
             error: mean.sqrt(),
-            bound: (mean + T_95 * uncertainty).sqrt(),
+            bound: (mean + T * uncertainty).sqrt(),
             uncertainty,
             noisy: noisy as usize,
         }

@@ -25,7 +25,7 @@ pub mod compare;
 pub mod estimate;
 mod tent;
 
-pub use allotment::Allotment;
+pub use allotment::{Allotment, mask};
 pub use compare::{Compared, Reference};
 pub use estimate::{Estimate, FrameError, Halves};
 
@@ -63,6 +63,16 @@ impl Grey {
         // In two steps: the square of a small scale may be 0.
         variance / scale / scale
     }
+}
+
+/// The mean of a number over each pixel and what is around it.
+///
+/// # Panics
+/// If the values are not whole rows.
+pub fn pool(values: &[f64], width: usize) -> Vec<f64> {
+    let weights = tent::around(&vec![1.0; values.len()], width, 1.0);
+    let sums = tent::around(values, width, 1.0);
+    sums.iter().zip(weights).map(|(sum, weight)| sum / weight).collect()
 }
 
 /// An error as a ratio of light to noise in decibels: 20 for 0.1, 40 for 0.01.
