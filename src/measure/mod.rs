@@ -16,6 +16,7 @@
 //! | `frontier` | what do the curves say? |
 //! | `report` | what came out? |
 //! | `html` | how does it look? |
+//! | `pilot` | what will a shot take? |
 //! | `probes`, `contributions` | how much variance does a way have, exactly? |
 //! | `machine` | what was it measured on? |
 //!
@@ -29,6 +30,7 @@ mod frontier;
 mod html;
 mod machine;
 mod picture;
+mod pilot;
 mod probes;
 mod reference;
 mod report;
@@ -41,6 +43,7 @@ pub use frontier::{Point, Reach};
 pub use html::{html, svg};
 pub use machine::Machine;
 pub use picture::{Picture, Subject};
+pub use pilot::{FrameCost, ShotCost, grey_of};
 pub use probes::{ProbeOptions, ProbeReport, StrategyReport, at_probes, visited};
 pub use reference::Converged;
 pub use report::{Curve, Report, Row, Terms, Trade, csv};

@@ -7,11 +7,12 @@
 //! the part that is left to reflected rays does not count. The ideal is 0.
 //!
 //! Variances are relative as every error is (see [`noise`](crate::render::noise)): over the square of the light
-//! at the point plus a grey floor, a tenth of the median light of all points. Without a floor the mean over the
+//! at the point plus a grey floor, a tenth of the geometric mean of the light at all points. Without a floor the mean over the
 //! points would be that of the few that next to nothing reaches.
 
 use super::contributions::{Contributions, shares};
 use super::entrant::Way;
+use super::reference::middle;
 use crate::light_tree::{LightTree, NoSuchFrame};
 use crate::math::random::{Sampler, hash};
 use crate::render::noise::Grey;
@@ -98,7 +99,8 @@ pub fn at_probes(
 fn report(integrator: &Integrator, options: &ProbeOptions) -> ProbeReport {
     let probes: Vec<Probe> =
         (0..options.probes).into_par_iter().filter_map(|i| probe(integrator, i, options)).collect();
-    let grey = options.grey.unwrap_or_else(|| Grey::below(middle(&probes)));
+    let grey =
+        options.grey.unwrap_or_else(|| Grey::below(middle(probes.iter().map(|probe| probe.sum))));
     let strategies = options.ways.iter().map(|way| {
         let Way { strategy, split, split_by } = *way;
         let settings = RenderSettings { strategy, split, split_by, ..integrator.settings.clone() };
@@ -131,13 +133,6 @@ fn probe(integrator: &Integrator, number: u32, options: &ProbeOptions) -> Option
     let sum = contributions.sum();
     let wanted = vertex.wanted(Some(&mut Sampler::new(seed, 1)));
     (sum > 0.0).then_some(Probe { wanted, contributions, sum })
-}
-
-/// The median light of some points.
-fn middle(probes: &[Probe]) -> f64 {
-    let mut sums: Vec<f64> = probes.iter().map(|probe| probe.sum).collect();
-    sums.sort_unstable_by(f64::total_cmp);
-    sums.get(sums.len() / 2).copied().unwrap_or(0.0)
 }
 
 fn of_way(

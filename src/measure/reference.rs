@@ -31,8 +31,7 @@ impl Converged {
         let Beauty { width, height, .. } = halves[0];
         let beauty =
             Beauty { width, height, pixels: pixels.map(|(a, b)| 0.5 * (*a + *b)).collect() };
-        let mean = luminance.iter().sum::<f64>() / luminance.len().max(1) as f64;
-        let grey = grey.unwrap_or_else(|| Grey::below(mean));
+        let grey = grey.unwrap_or_else(|| Grey::below(middle(luminance.iter().copied())));
         let noisy: Vec<f64> = variance
             .iter()
             .zip(&luminance)
@@ -43,6 +42,15 @@ impl Converged {
         let reference = Reference { width: width as usize, luminance, variance };
         Converged { reference, beauty, grey, error }
     }
+}
+
+/// The middle of some luminances, as a shot's grey floor follows from it: the geometric mean of those that
+/// are lit, 0 if none is.
+pub fn middle(luminances: impl Iterator<Item = f64>) -> f64 {
+    let lit = luminances.filter(|light| *light > 0.0 && light.is_finite());
+    let (sum, count) =
+        lit.fold((0.0, 0.0), |(sum, count), light| (sum + light.log2(), count + 1.0));
+    if count > 0.0 { f64::exp2(sum / count) } else { 0.0 }
 }
 
 #[cfg(test)]
@@ -61,6 +69,7 @@ mod tests {
         // A deviation of 1 over the light and the floor; the pixel without noise does not count.
         assert!((converged.error - 0.25).abs() < 1e-6);
         let floor = Converged::of(&[half(3.0), half(1.0)], None).grey;
-        assert!((floor.luminance() - 0.15).abs() < 1e-6);
+        assert!((floor.luminance() - 0.1 * 2.0_f64.sqrt()).abs() < 1e-6);
+        assert_eq!(middle([0.0, f64::NAN].into_iter()), 0.0);
     }
 }

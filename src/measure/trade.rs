@@ -73,29 +73,39 @@ pub struct Cell {
 }
 
 /// Work that is done and work to be done, in samples of a pixel.
-struct Account<'a> {
+pub(super) struct Account<'a> {
     onlooker: &'a dyn Onlooker,
     all: f64,
     before: f64,
-    /// What is rendered now, and how many of its rows there are and are done.
+    /// What is rendered now, and how many samples it has and will have.
     now: f64,
-    rows: u32,
-    done_rows: AtomicU64,
+    taken: AtomicU64,
+    expected: AtomicU64,
 }
 
-impl Account<'_> {
-    fn begin(&mut self, what: &str, weight: f64) {
+impl<'a> Account<'a> {
+    pub fn new(onlooker: &'a dyn Onlooker, all: f64) -> Account<'a> {
+        let (taken, expected) = (AtomicU64::new(0), AtomicU64::new(1));
+        Account { onlooker, all, before: 0.0, now: 0.0, taken, expected }
+    }
+
+    pub fn begin(&mut self, what: &str, weight: f64) {
         self.before += self.now;
         self.now = weight;
-        self.done_rows = AtomicU64::new(0);
+        self.taken = AtomicU64::new(0);
         self.onlooker.begins(what);
     }
 }
 
 impl Progress for Account<'_> {
-    fn rows_done(&self, rows: u64) {
-        let done = self.done_rows.fetch_add(rows, Relaxed) + rows;
-        let share = done as f64 / f64::from(self.rows.max(1));
+    fn expects(&self, taken: u64, all: u64) {
+        self.taken.store(taken, Relaxed);
+        self.expected.store(all, Relaxed);
+    }
+
+    fn samples_taken(&self, samples: u64) {
+        let done = self.taken.fetch_add(samples, Relaxed) + samples;
+        let share = done as f64 / self.expected.load(Relaxed).max(1) as f64;
         self.onlooker.is_at((self.before + self.now * share.min(1.0)) / self.all.max(1.0));
     }
 
@@ -118,8 +128,7 @@ pub fn trade<D: AsRef<[u8]>>(
     let all = f64::from(options.reference_samples)
         + f64::from(options.seeds)
             * options.entrants.iter().map(|e| weight(e, options.lights)).sum::<f64>();
-    let (now, before, rows) = (0.0, 0.0, subject.base.height);
-    let mut account = Account { onlooker, all, before, now, rows, done_rows: AtomicU64::new(0) };
+    let mut account = Account::new(onlooker, all);
     let converged = converge(subject, options, cache, &mut account)?;
     let mut cells: Vec<Vec<Cell>> = vec![Vec::new(); options.entrants.len()];
     for number in 0..options.seeds {
@@ -153,8 +162,8 @@ pub fn again<D: AsRef<[u8]>>(
     entrant: &Entrant,
     onlooker: &dyn Onlooker,
 ) -> Result<Beauty, RenderError> {
-    let (all, before, rows) = (1.0, 0.0, subject.base.height);
-    let account = Account { onlooker, all, before, now: 1.0, rows, done_rows: AtomicU64::new(0) };
+    let mut account = Account::new(onlooker, 1.0);
+    account.begin("pictures for the page", 1.0);
     Ok(subject.render(settings_of(entrant, subject, 0), &account)?.beauty)
 }
 

@@ -11,6 +11,7 @@ mod lost_pages;
 mod measure;
 mod measure_table;
 mod page;
+mod pilot;
 mod run;
 mod run_display;
 mod shot;

@@ -1,17 +1,18 @@
 //! `candelabra measure`: the trade of speed against accuracy in a scene.
 
 use crate::display::{Display, Form, Progress};
-use crate::page;
 use crate::shot::Shot;
 use crate::stderr::say;
 use crate::stop::{STOPPED, Stop};
+use crate::{page, pilot};
 use anyhow::{Context, Result, bail};
 use candelabra::measure::{
     self, Asked, Cache, Converged, Entrant, LEAST_SAMPLES, Machine, Onlooker, ProbeOptions, Report,
-    Subject, Terms, Trade, TradeError, TradeOptions, Way, at_probes,
+    ShotCost, Subject, Terms, Trade, TradeError, TradeOptions, Way, at_probes,
 };
-use candelabra::pipeline::{Event, Stamper, Watch, option};
+use candelabra::pipeline::{Effort, Event, Stamper, Watch, option};
 use candelabra::render::beauty::Beauty;
+use candelabra::render::frames::Frames;
 use candelabra::render::noise::Grey;
 use candelabra::render::{LightStrategy, RenderDelegate, RenderError, RenderSettings, SplitBy};
 use candelabra::store::{check_writable, write_atomically};
@@ -23,7 +24,7 @@ use std::process::ExitCode;
 #[derive(Args)]
 pub struct Arguments {
     #[command(flatten)]
-    shot: crate::shot::Arguments,
+    pub scene: crate::shot::Arguments,
     /// What to measure: STRATEGY[:SPLIT[:TEST]][@SAMPLES], such as tree, tree:0.3@16,
     /// tree:0.3:solid-angle@4, all@2. Without samples at every budget. If nothing is named: uniform, power,
     /// distance:0, tree:0 and tree, and where there are few lights exhaustive and all
@@ -33,26 +34,36 @@ pub struct Arguments {
         value_parser = clap::value_parser!(u32).range(i64::from(LEAST_SAMPLES)..=1 << 20))]
     budgets: Vec<u32>,
     /// The error that is to be reached: 0.1 for a draft, 0.05 for a preview, 0.02 for a final picture
-    #[arg(long, default_value_t = 0.05, value_parser = positive)]
-    error: f64,
-    /// Size of the picture in pixels, WxH
-    #[arg(long, default_value = "320x180", value_parser = option::size)]
-    res: (u32, u32),
-    /// Bounces of light to the eye
-    #[arg(long, default_value_t = 1)]
-    depth: u32,
+    #[arg(long, default_value = "preview", value_parser = option::error)]
+    pub error: f64,
+    /// Size of the picture in pixels, WxH; 320x180 if not given, with --shot 1280x720
+    #[arg(long, value_parser = option::size)]
+    pub res: Option<(u32, u32)>,
+    /// Bounces of light to the eye; 1 if not given, with --shot as many as a render has
+    #[arg(long)]
+    pub depth: Option<u32>,
+    /// Render small pictures of some frames instead, and tell what each frame and the shot will take to reach
+    /// the error
+    #[arg(long, conflicts_with_all = ["ways", "exact", "csv", "html", "svg", "frame", "visibility"])]
+    pub shot: bool,
+    /// With --shot, its frames, such as 1001-1048; those of the scene if not given
+    #[arg(long, requires = "shot", allow_hyphen_values = true)]
+    pub frames: Option<Frames>,
+    /// With --shot, look at every so many frames; at about eight in all if not given
+    #[arg(long, requires = "shot", value_name = "STEP", value_parser = clap::value_parser!(u32).range(1..))]
+    pub every: Option<u32>,
     /// At most so many lights at a point
     #[arg(long, default_value_t = RenderSettings::default().max_lights, value_parser = clap::value_parser!(u32).range(1..))]
-    max_lights: u32,
+    pub max_lights: u32,
     /// Pictures by each, with different seeds
     #[arg(long, default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..=1 << 16))]
     seeds: u32,
     /// Samples of the picture that all are compared with; 16 times the largest budget if not given
     #[arg(long, value_name = "SAMPLES", value_parser = clap::value_parser!(u32).range(i64::from(LEAST_SAMPLES)..=1 << 24))]
     reference_spp: Option<u32>,
-    /// The luminance below which error is absolute; a tenth of the picture's mean if not given
-    #[arg(long, value_name = "NITS", value_parser = positive)]
-    grey: Option<f64>,
+    /// The luminance below which error is absolute; a tenth of the picture's middle if not given
+    #[arg(long, value_name = "LUMINANCE", value_parser = option::grey)]
+    pub grey: Option<Grey>,
     /// Render nothing: only compute exact variances at points that camera paths visit
     #[arg(long, conflicts_with_all = ["svg", "csv", "reference_spp", "fresh", "cache"])]
     exact: bool,
@@ -67,7 +78,7 @@ pub struct Arguments {
     visibility: bool,
     /// Other noise, other points
     #[arg(long, default_value_t = 0)]
-    seed: u32,
+    pub seed: u32,
     /// Threads; as many as there are cores if not given
     #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024))]
     threads: Option<u16>,
@@ -79,7 +90,7 @@ pub struct Arguments {
     fresh: bool,
     /// Write JSON; - for standard output
     #[arg(long, value_name = "FILE")]
-    json: Option<PathBuf>,
+    pub json: Option<PathBuf>,
     /// Write a table of the budgets as CSV; - for standard output
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
@@ -93,13 +104,8 @@ pub struct Arguments {
     progress: Progress,
 }
 
-fn positive(text: &str) -> Result<f64, String> {
-    let number = text.parse().ok().filter(|number: &f64| *number > 0.0 && number.is_finite());
-    number.ok_or_else(|| "write a number above 0".into())
-}
-
 /// Passes on what the library tells.
-struct Teller<'a>(&'a Display);
+pub struct Teller<'a>(pub &'a Display);
 
 impl Onlooker for Teller<'_> {
     fn begins(&self, what: &str) {
@@ -126,28 +132,49 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     }
     let files = streams.filter(|file| !is_stdout(file)).chain(&arguments.svg);
     for file in files.chain(&arguments.html) {
-        page::check(file, &[arguments.shot.scene()])?;
+        page::check(file, &[arguments.scene.scene()])?;
         check_writable(file)?;
     }
     if let Some(threads) = arguments.threads {
         rayon::ThreadPoolBuilder::new().num_threads(threads.into()).build_global()?;
     }
     let stop = Stop::listen()?;
-    let measured = {
-        // What others read on standard output is not mixed with lines about progress.
-        let is_mute = to_stdout > 0 && !std::io::stderr().is_terminal();
-        let form = if is_mute { Form::None } else { arguments.progress.form };
-        measure(arguments, &Display::new(Progress { form }, &stop))
+    // What others read on standard output is not mixed with lines about progress.
+    let is_mute = to_stdout > 0 && !std::io::stderr().is_terminal();
+    let form = if is_mute { Form::None } else { arguments.progress.form };
+    let display = Display::new(Progress { form }, &stop);
+    let outcome = if arguments.shot {
+        let cost = pilot::run(arguments, &display);
+        drop(display);
+        cost.and_then(|cost| write_cost(arguments, &cost))
+    } else {
+        let measured = measure(arguments, &display);
+        drop(display);
+        measured.and_then(|(report, pictures)| write(arguments, &report, pictures.as_ref()))
     };
-    if let (Err(error), Some(signal)) = (&measured, stop.signal())
-        && is_stop(error)
-    {
-        say("stopped: what is finished is kept, and the same command goes on from there");
-        return Ok((STOPPED + signal).into());
+    match (outcome, stop.signal()) {
+        (Err(error), Some(signal)) if is_stop(&error) => {
+            say("stopped: what is finished is kept, and the same command goes on from there");
+            Ok((STOPPED + signal).into())
+        }
+        (outcome, _) => outcome.map(|()| ExitCode::SUCCESS),
     }
-    let (report, pictures) = measured?;
-    write(arguments, &report, pictures.as_ref())?;
-    Ok(ExitCode::SUCCESS)
+}
+
+fn write_cost(arguments: &Arguments, cost: &ShotCost) -> Result<()> {
+    let is_told = put(&arguments.json, || Ok(serde_json::to_string_pretty(cost)? + "\n"))?;
+    if is_told { Ok(()) } else { pilot::print(&mut std::io::stdout().lock(), cost) }
+}
+
+/// Writes a text to a file, if one is given. Whether it went to standard output.
+fn put(file: &Option<PathBuf>, text: impl FnOnce() -> Result<String>) -> Result<bool> {
+    let Some(file) = file else { return Ok(false) };
+    let text = text()?;
+    match is_stdout(file) {
+        true => std::io::stdout().lock().write_all(text.as_bytes())?,
+        false => write_atomically(file, |out| out.write_all(text.as_bytes()))?,
+    }
+    Ok(is_stdout(file))
 }
 
 fn is_stdout(file: &Path) -> bool {
@@ -162,13 +189,14 @@ fn is_stop(error: &anyhow::Error) -> bool {
 }
 
 fn measure(arguments: &Arguments, display: &Display) -> Result<Measured> {
-    let (width, height) = arguments.res;
+    let (width, height) = arguments.res.unwrap_or((320, 180));
     display.tell(Event::Stage { name: "reading the scene".into() });
-    let shot = Shot::prepare(&arguments.shot, width as f32 / height as f32)?;
-    let (depth, max_lights, seed) = (arguments.depth, arguments.max_lights, arguments.seed);
+    let shot = Shot::prepare(&arguments.scene, width as f32 / height as f32)?;
+    let depth = arguments.depth.unwrap_or(1);
+    let (max_lights, seed) = (arguments.max_lights, arguments.seed);
     let base = RenderSettings { width, height, depth, max_lights, seed, ..Default::default() };
     let machine = Machine::this(rayon::current_num_threads());
-    let scene = arguments.shot.scene().display().to_string();
+    let scene = arguments.scene.scene().display().to_string();
     let mut report = Report::new(scene, shot.frame, machine, base.clone());
     let mut delegate =
         RenderDelegate::new(&shot.scene, &shot.emitters, shot.camera.clone(), base.clone());
@@ -181,7 +209,7 @@ fn measure(arguments: &Arguments, display: &Display) -> Result<Measured> {
             probes: arguments.probes,
             visibility: arguments.visibility,
             ways: exact_ways(arguments),
-            grey: arguments.grey.and_then(Grey::new),
+            grey: arguments.grey,
             seed,
         };
         report.exact = Some(at_probes(&delegate, &shot.tree, shot.frame, &options)?);
@@ -195,13 +223,14 @@ fn measure(arguments: &Arguments, display: &Display) -> Result<Measured> {
         entrants,
         seeds: arguments.seeds,
         reference_samples: arguments.reference_spp.unwrap_or(16 * most).next_multiple_of(2),
-        grey: arguments.grey.and_then(Grey::new),
+        grey: arguments.grey,
         lights: report.lights,
     };
     let rest = format!("{} {:?}", options.reference_samples, options.grey);
-    let stamper = Stamper::new(&shot.scene, &shot.camera, &base, ())?;
+    let effort = Effort::samples(base.samples);
+    let stamper = Stamper::new(&shot.scene, &shot.camera, (&base, &effort), ())?;
     let root = cache_root(arguments)?;
-    let fingerprint = stamper.fingerprint(shot.frame);
+    let fingerprint = stamper.fingerprint(shot.frame, None);
     let cache = Cache::new(&root, &fingerprint, &rest, &report.machine, arguments.fresh);
     let teller = Teller(display);
     let mut subject = Subject {
@@ -288,22 +317,13 @@ fn write(
     report: &Report,
     pictures: Option<&(Converged, Vec<(Entrant, Beauty)>)>,
 ) -> Result<()> {
-    let put = |file: &Option<PathBuf>, text: &dyn Fn() -> Result<String>| -> Result<bool> {
-        let Some(file) = file else { return Ok(false) };
-        let text = text()?;
-        match is_stdout(file) {
-            true => std::io::stdout().lock().write_all(text.as_bytes())?,
-            false => write_atomically(file, |out| out.write_all(text.as_bytes()))?,
-        }
-        Ok(is_stdout(file))
-    };
     let trade = report.trade.as_ref();
     let json = || Ok(candelabra::page::plain_json(&serde_json::to_string_pretty(report)?) + "\n");
-    let is_told = put(&arguments.json, &json)?
-        | put(&arguments.csv, &|| Ok(trade.map_or(String::new(), measure::csv)))?;
-    put(&arguments.svg, &|| Ok(trade.map_or(String::new(), measure::svg)))?;
+    let is_told = put(&arguments.json, json)?
+        | put(&arguments.csv, || Ok(trade.map_or(String::new(), measure::csv)))?;
+    put(&arguments.svg, || Ok(trade.map_or(String::new(), measure::svg)))?;
     let shown = pictures.map(|(converged, pictures)| (converged, pictures.as_slice()));
-    put(&arguments.html, &|| Ok(measure::html(report, shown)))?;
+    put(&arguments.html, || Ok(measure::html(report, shown)))?;
     if is_told {
         return Ok(());
     }

@@ -27,6 +27,11 @@ impl Arguments {
     pub fn scene(&self) -> &Path {
         &self.scene
     }
+
+    /// What to look at it through.
+    pub fn view(&self) -> &View {
+        &self.view
+    }
 }
 
 /// A scene with the tree of one frame.
