@@ -44,7 +44,8 @@ pub struct Arguments {
     pub depth: Option<u32>,
     /// Render small pictures of some frames instead, and tell what each frame and the shot will take to reach
     /// the error
-    #[arg(long, conflicts_with_all = ["ways", "exact", "csv", "html", "svg", "frame", "visibility"])]
+    #[arg(long, conflicts_with_all = ["ways", "exact", "csv", "html", "svg", "frame", "visibility", "budgets", "seeds",
+        "reference_spp", "probes", "split", "cache", "fresh"])]
     pub shot: bool,
     /// With --shot, its frames, such as 1001-1048; those of the scene if not given
     #[arg(long, requires = "shot", allow_hyphen_values = true)]
