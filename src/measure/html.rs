@@ -15,8 +15,8 @@ use image::RgbImage;
 
 /// A colour for each way; beyond these, the same again, dashed.
 const INKS: [Ink; 6] = [Ink::Grey, Ink::Blue, Ink::Green, Ink::Orange, Ink::Red, Ink::Violet];
-/// What is white in a map of error, over the error that was asked for.
-const WHITE: f32 = 5.0;
+/// What is white in a map of error, over the middle between the least and the largest error of the pictures.
+const WHITE: f64 = 2.0;
 
 /// The page of a report. `pictures` are those that it shows, at [`equal times`](Trade::at_equal_times), beside
 /// the converged one; a report without pictures has none.
@@ -110,6 +110,12 @@ fn chart(trade: &Trade) -> Chart {
 
 fn look(page: &mut Page, trade: &Trade, converged: &Converged, pictures: &[(Entrant, Beauty)]) {
     page.heading("Pictures at equal times");
+    let error_of = |entrant: &Entrant| {
+        let row = trade.rows.iter().find(|row| row.entrant == *entrant);
+        row.map_or(f64::INFINITY, |row| row.error)
+    };
+    let mut pictures: Vec<&(Entrant, Beauty)> = pictures.iter().collect();
+    pictures.sort_by(|a, b| error_of(&a.0).total_cmp(&error_of(&b.0)));
     let exposure = exposure_for(&converged.beauty);
     let picture = |name: String, beauty: &Beauty| {
         let pixels = shown(beauty, exposure);
@@ -125,17 +131,21 @@ fn look(page: &mut Page, trade: &Trade, converged: &Converged, pictures: &[(Entr
     let own = pictures.iter().filter_map(|(entrant, beauty)| picture(name(entrant), beauty));
     let reference = picture("the reference".into(), &converged.beauty);
     page.add(&Wipe {
-        caption: "Of each way the budget that takes about as long as those of the others.".into(),
+        caption: "Of each way the budget that takes about as long as those of the others, the best first."
+            .into(),
         pictures: own.chain(reference).collect(),
     });
     page.heading("Where the error is");
+    let ends =
+        [pictures.first(), pictures.last()].map(|end| end.map_or(0.0, |end| error_of(&end.0)));
+    let white = (WHITE * (ends[0] * ends[1]).sqrt()).max(f64::from(f32::MIN_POSITIVE)) as f32;
     for (entrant, beauty) in pictures {
         let squares = converged.reference.squared_errors(&luminances(beauty), converged.grey);
         page.add(&HeatMap {
             caption: name(entrant),
             width: beauty.width,
             values: squares.iter().map(|square| square.max(0.0).sqrt() as f32).collect(),
-            scale: Scale::Heat { white: WHITE * trade.terms.error as f32 },
+            scale: Scale::Heat { white },
         });
     }
 }

@@ -1,9 +1,9 @@
 //! What a shot will take at an error, from small pictures of some of its frames.
 //!
-//! Each small picture is rendered until its own error is as asked, in the way in which the whole frame will be.
-//! How many samples a pixel needs depends little on the size of the picture, and what a sample costs hardly; so both
-//! carry over. Small pictures err on the side of caution: their pixels are broader, so there is more to average
-//! in each, and their fewer pixels prove the error less sharply.
+//! Each small picture is rendered as the whole frame will be, samples where the error is, but stops at few. What a
+//! pixel needs for the error follows from its noise so far, as in every pass of a render; how many samples that
+//! is depends little on the size of the picture, and what a sample costs hardly. It errs on the side of caution:
+//! the noise of well stratified samples falls faster than is assumed, and broad pixels have more to average.
 
 use super::picture::Subject;
 use super::reference::middle;
@@ -19,6 +19,8 @@ use std::time::Instant;
 const HEIGHT: u32 = 54;
 /// Samples of a pixel from which the grey floor is told.
 const SAMPLES: u32 = 16;
+/// A pixel of a small picture gets no more samples.
+const MOST: u32 = 64;
 
 /// What a frame will take.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -29,7 +31,7 @@ pub struct FrameCost {
     pub samples: f64,
     /// Seconds for the whole frame, on this machine.
     pub seconds: f64,
-    /// The share of pixels that will have as many samples as they may and not be settled.
+    /// The share of pixels that will have as many samples as they may.
     pub capped: f64,
 }
 
@@ -89,18 +91,23 @@ impl<D: AsRef<[u8]>> Subject<'_, '_, D> {
         let started = Instant::now();
         self.delegate.at_frame(self.tree, self.frame, |_| ())?;
         let before = started.elapsed().as_secs_f64();
-        let (mut film, mut control) = (self.delegate.film()?, ToError::new(goal));
+        let mut film = self.delegate.film()?;
+        let mut control = ToError::new(ErrorGoal { most: goal.most.min(MOST), ..goal });
         let started = Instant::now();
         let account = Account::new(onlooker, 0.0);
         self.delegate.expose(self.tree, self.frame, &mut film, &mut control, &account)?;
         let tracing = (started.elapsed().as_secs_f64() - before).max(0.0);
-        let small = film.taken().len() as f64;
+        let per_sample = tracing / film.samples().max(1) as f64;
+        let needed = goal.allotment().needed(&film.estimate(goal.grey), goal.error);
+        let small = needed.len() as f64;
+        let samples = needed.iter().sum::<f64>() / small;
         let pixels = f64::from(self.base.width) * f64::from(self.base.height);
+        let most = f64::from(goal.most);
         Ok(FrameCost {
             frame: self.frame,
-            samples: film.samples() as f64 / small,
-            seconds: before + tracing * pixels / small,
-            capped: control.reached().capped as f64 / small,
+            samples,
+            seconds: before + per_sample * samples * pixels,
+            capped: needed.iter().filter(|&&count| count >= most).count() as f64 / small,
         })
     }
 }

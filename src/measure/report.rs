@@ -145,7 +145,7 @@ impl Row {
 }
 
 impl Trade {
-    /// Curves and frontier of some entrants, and what to do to reach an error.
+    /// Curves and frontier of some entrants, which are sorted by way, and what to do to reach an error.
     pub fn new(mut rows: Vec<Row>, terms: Terms, settings: &RenderSettings) -> Trade {
         let error = terms.error;
         let points: Vec<Point> = rows.iter().map(Row::point).collect();
@@ -156,6 +156,7 @@ impl Trade {
                 ways.push(row.entrant.way);
             }
         }
+        rows.sort_by_key(|row| ways.iter().position(|way| *way == row.entrant.way));
         let curve = |way: &Way| {
             let points = points_of(&rows, way);
             let (slope, reach) = (slope(&points), reach(&points, error));
@@ -303,7 +304,7 @@ mod tests {
         assert!(text.ends_with("the next best, power, takes 64 s."), "{text}");
         assert_eq!(trade.curves.len(), 2);
         let on: Vec<bool> = trade.rows.iter().map(|row| row.is_on_frontier).collect();
-        assert_eq!(on, [true, true, false, true]);
+        assert_eq!(on, [true, false, true, true]);
     }
 
     #[test]
@@ -319,7 +320,7 @@ mod tests {
         let counts: Vec<usize> = text.lines().map(|line| line.split(',').count()).collect();
         assert_eq!(counts, [13; 5]);
         assert!(
-            text.lines().nth(2).unwrap().starts_with("tree,0.5,variance,4,2,0.1,20,"),
+            text.lines().nth(3).unwrap().starts_with("tree,0.5,variance,4,2,0.1,20,"),
             "{text}"
         );
     }

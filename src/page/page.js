@@ -57,7 +57,7 @@ function wipe(figure) {
   const [left, right] = ["left picture", "right picture"].map((ariaLabel) => element("select", { ariaLabel }));
   left.append(...options());
   right.append(...options());
-  [left.value, right.value] = [0, Math.min(1, shots.length - 1)];
+  [left.value, right.value] = [0, shots.length - 1];
 
   const show = () => {
     [under.src, over.src] = [shots[left.value].src, shots[right.value].src];

@@ -12,7 +12,7 @@ use std::fmt::{self, Display};
 pub struct Wipe {
     /// What they show.
     pub caption: String,
-    /// The pictures and their names. The first two are laid over each other at first.
+    /// The pictures and their names. The first and the last are laid over each other at first.
     pub pictures: Vec<(String, RgbImage)>,
 }
 

@@ -7,7 +7,8 @@ use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
 /// Small and quick.
-const SMALL: &str = "--res 12x8 --budgets 2,4 --seeds 2 --reference-spp 16 --probes 8 --cache cache";
+const SMALL: &str =
+    "--res 12x8 --budgets 2,4 --seeds 2 --reference-spp 16 --probes 8 --cache cache";
 
 fn report(shot: &Shot, arguments: &str) -> Value {
     let told = shot.candelabra(&format!("measure {SCENE} {SMALL} {arguments} --json -")).ends(0);
@@ -19,7 +20,8 @@ fn every_form_tells_the_same() {
     let shot = Shot::still();
     let files = "--json r.json --csv r.csv --html deep/r.html --svg r.svg";
     let told = shot.candelabra(&format!("measure {SCENE} {SMALL} {files}")).ends(0);
-    let told = told.says("exact variance of picking").says("To reach error 0.05: ").says("tree:0.5");
+    let told =
+        told.says("exact variance of picking").says("To reach error 0.05: ").says("tree:0.5");
     let report: Value = serde_json::from_slice(&shot.read("r.json")).unwrap();
     let trade = &report["trade"];
     // There are few lights: seven ways of two budgets.
@@ -50,8 +52,12 @@ fn a_second_run_renders_nothing_unless_it_is_told_to() {
     let shot = Shot::still();
     let ways = "tree:0 uniform@8";
     let first = report(&shot, ways);
-    let names: Vec<&str> =
-        first["trade"]["rows"].as_array().unwrap().iter().map(|r| r["name"].as_str().unwrap()).collect();
+    let names: Vec<&str> = first["trade"]["rows"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|r| r["name"].as_str().unwrap())
+        .collect();
     assert_eq!(names, ["tree:0@2", "tree:0@4", "uniform@8"]);
     // No two renders take the same time to the nanosecond, let alone six.
     assert_eq!(report(&shot, ways)["trade"], first["trade"]);
@@ -91,8 +97,18 @@ fn exact_variances_alone_render_and_keep_nothing() {
 fn nonsense_is_refused_before_any_work() {
     let shot = Shot::still();
     for wrong in [
-        "trees", "tree:nan", "tree@1", "uniform:0.5", "--error 0", "--error nan", "--grey -1",
-        "--budgets 1", "--exact --svg a.svg", "--frames 1-2", "--shot --frame 1", "--shot tree",
+        "trees",
+        "tree:nan",
+        "tree@1",
+        "uniform:0.5",
+        "--error 0",
+        "--error nan",
+        "--grey -1",
+        "--budgets 1",
+        "--exact --svg a.svg",
+        "--frames 1-2",
+        "--shot --frame 1",
+        "--shot tree",
     ] {
         shot.candelabra(&format!("measure {SCENE} {wrong}")).ends(2);
     }
@@ -100,7 +116,9 @@ fn nonsense_is_refused_before_any_work() {
     let both = shot.candelabra(&format!("measure {SCENE} --json - --csv -")).ends(1);
     both.complains(&["standard output"]);
     for own in ["--html", "--json", "--svg"] {
-        shot.candelabra(&format!("measure {SCENE} {own} ./{SCENE}")).ends(1).complains(&["another name"]);
+        shot.candelabra(&format!("measure {SCENE} {own} ./{SCENE}"))
+            .ends(1)
+            .complains(&["another name"]);
     }
     assert_eq!(shot.names(), [SCENE]);
 }
@@ -108,7 +126,8 @@ fn nonsense_is_refused_before_any_work() {
 #[test]
 fn a_shot_is_told_beforehand() {
     let shot = Shot::moving();
-    let command = format!("measure {SCENE} --shot --res 48x32 --depth 1 --frames 1-25 --every 8 --error 0.2");
+    let command =
+        format!("measure {SCENE} --shot --res 48x32 --depth 1 --frames 1-25 --every 8 --error 0.2");
     let told = shot.candelabra(&command).ends(0);
     told.says("25 frames to error 0.2 (14 dB)").says("render with --error 0.2 --grey ");
     let told = shot.candelabra(&format!("{command} --json -")).ends(0);
@@ -122,10 +141,17 @@ fn a_shot_is_told_beforehand() {
     let seconds = cost["frames"].as_array().unwrap().iter().map(|row| row[1].as_f64().unwrap());
     assert!((seconds.sum::<f64>() - cost["seconds"].as_f64().unwrap()).abs() < 1e-9);
     // A smaller error takes more samples, on every frame.
-    let told = shot.candelabra(&format!("{command} --error 0.05 --json -").replace("--error 0.2 ", "")).ends(0);
+    let told = shot
+        .candelabra(&format!("{command} --error 0.05 --json -").replace("--error 0.2 ", ""))
+        .ends(0);
     let finer: Value = serde_json::from_str(&told.out).unwrap();
     let samples = |cost: &Value| -> Vec<f64> {
-        cost["pilots"].as_array().unwrap().iter().map(|row| row["samples"].as_f64().unwrap()).collect()
+        cost["pilots"]
+            .as_array()
+            .unwrap()
+            .iter()
+            .map(|row| row["samples"].as_f64().unwrap())
+            .collect()
     };
     assert!(samples(&finer).iter().zip(samples(&cost)).all(|(fine, coarse)| *fine > coarse));
     assert_eq!(shot.names(), [SCENE]);
@@ -168,7 +194,9 @@ fn a_signal_leaves_a_cache_that_can_be_gone_on_with() {
         assert!(child.try_wait().unwrap().is_none(), "it ended by itself");
         std::thread::sleep(Duration::from_millis(5));
     }
-    assert!(Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success());
+    assert!(
+        Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap().success()
+    );
     let output = child.wait_with_output().unwrap();
     assert_eq!(output.status.code(), Some(130));
     assert!(String::from_utf8_lossy(&output.stderr).contains("goes on from there"));

@@ -50,8 +50,7 @@ fn measured() -> Measured {
         let settings = RenderSettings { width: 160, height: 90, ..Default::default() };
         let camera = stage.scene.cameras[0].clone();
         let delegate = RenderDelegate::new(&stage.scene, &set.emitters, camera, settings);
-        let options =
-            ProbeOptions { probes: 192, visibility, ways: ways(), grey: None, seed: 0 };
+        let options = ProbeOptions { probes: 192, visibility, ways: ways(), grey: None, seed: 0 };
         let report = at_probes(&delegate, &set.tree, 1, &options).unwrap();
         assert!(report.probes > 100, "{name}: {} points are lit", report.probes);
         for row in report.strategies {
@@ -72,7 +71,10 @@ fn differences(before: &Measured, after: &Measured) -> [Vec<String>; 2] {
         };
         let told = ["variance", "ninth decile", "lights"];
         for (what, (old, now)) in told.iter().zip(old.iter().zip(now)) {
-            let line = format!("{name}: {what} {old:.6} -> {now:.6} ({:+.1} %)", 100.0 * (now / old - 1.0));
+            let line = format!(
+                "{name}: {what} {old:.6} -> {now:.6} ({:+.1} %)",
+                100.0 * (now / old - 1.0)
+            );
             if *now > old * (1.0 + ROUNDING) + NONE {
                 worse.push(line);
             } else if *now < old * (1.0 - ROUNDING) - NONE {

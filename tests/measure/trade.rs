@@ -72,7 +72,10 @@ fn a_run_that_is_stopped_goes_on_where_it_was() {
     assert!(matches!(stopped, TradeError::Render(RenderError::Stopped)), "{stopped}");
     let kept = || {
         let files = walk(folder.path());
-        files.into_iter().map(|file| (file.clone(), std::fs::read(file).unwrap())).collect::<Vec<_>>()
+        files
+            .into_iter()
+            .map(|file| (file.clone(), std::fs::read(file).unwrap()))
+            .collect::<Vec<_>>()
     };
     let before = kept();
     assert_eq!(before.len(), 4);
@@ -96,8 +99,7 @@ fn errors_do_not_depend_on_threads_or_runs() {
     let errors = |threads: usize| {
         let folder = tempfile::tempdir().unwrap();
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        let measured =
-            pool.install(|| measure(&stage, &set, folder.path(), &patience(usize::MAX)));
+        let measured = pool.install(|| measure(&stage, &set, folder.path(), &patience(usize::MAX)));
         let (converged, rows) = measured.unwrap();
         let rows: Vec<_> = rows.iter().map(|row| (row.errors, row.mean_off, row.lights)).collect();
         (converged.reference, rows)
@@ -129,9 +131,8 @@ fn importance_beats_blind_picking_and_more_samples_beat_fewer() {
 
 fn walk(folder: &Path) -> Vec<std::path::PathBuf> {
     let entries = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
-    let mut files: Vec<_> = entries
-        .flat_map(|path| if path.is_dir() { walk(&path) } else { vec![path] })
-        .collect();
+    let mut files: Vec<_> =
+        entries.flat_map(|path| if path.is_dir() { walk(&path) } else { vec![path] }).collect();
     files.sort();
     files
 }

@@ -104,7 +104,7 @@ pub fn print(out: &mut impl Write, cost: &ShotCost) -> Result<()> {
     writeln!(
         out,
         "{:<8} {:>16} {:>12} {:>16}",
-        "frame", "samples a pixel", "seconds", "not settled"
+        "frame", "samples a pixel", "seconds", "at the most"
     )?;
     for FrameCost { frame, samples, seconds, capped } in &cost.pilots {
         writeln!(out, "{frame:<8} {samples:>16.1} {seconds:>12.1} {:>14.2} %", 100.0 * capped)?;
