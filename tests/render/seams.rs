@@ -1,13 +1,14 @@
 //! No seams in the noise: where the decision to split changes, variance does not jump.
 
 use crate::stage::{Stage, at, direct, facing, lambert};
-use crate::statistics::{Pixel, pixels};
 use crate::strategies::Way;
-use candelabra::render::SplitBy;
+use candelabra::render::{RenderDelegate, RenderSettings, SplitBy};
 use candelabra::scene::LightKind;
 use glam::{DVec3, Vec3};
 
-/// The variance of one sample of each pixel of a row across a floor, away from a cluster of lights
+const SAMPLES: u32 = 8192;
+
+/// The relative variance of one sample of each pixel of a row across a floor, away from a cluster of lights
 /// above its one end.
 fn profile(way: Way) -> Vec<f64> {
     const PIXELS: u32 = 96;
@@ -21,13 +22,28 @@ fn profile(way: Way) -> Vec<f64> {
     }
     // Far away, so that the row is a straight line of even steps.
     stage.look(DVec3::new(0.0, 400.0, 1e-3), DVec3::ZERO, 6.0 / 400.0 / PIXELS as f32);
-    let mut settings = way.settings(true, &direct(PIXELS, 8192));
+    let mut settings = way.settings(true, &direct(PIXELS, 1));
     settings.height = 1;
-    let buffers = stage.set().render(&settings, 1);
-    let of_one =
-        |pixel: &Pixel| f64::from(pixel.variance.y * 8192.0) / f64::from(pixel.beauty.y).powi(2);
+    // Pictures of one sample each: those of one picture are not independent.
+    let set = stage.set();
+    let (emitters, tree) = (&set.emitters, &set.tree);
+    let camera = stage.scene.cameras[0].clone();
+    let mut delegate = RenderDelegate::new(&stage.scene, emitters, camera, settings.clone());
+    let mut sums = [[0.0; 2]; PIXELS as usize];
+    for seed in 0..SAMPLES {
+        delegate.set_settings(RenderSettings { seed, ..settings.clone() });
+        let frame = delegate.render(tree, 1, &()).unwrap();
+        for (sum, light) in sums.iter_mut().zip(frame.buffers.beauty()) {
+            let light = f64::from(light.y);
+            *sum = [sum[0] + light, sum[1] + light * light];
+        }
+    }
+    let relative_variance = |[sum, squares]: &[f64; 2]| {
+        let mean = sum / f64::from(SAMPLES);
+        (squares / f64::from(SAMPLES) - mean * mean) / (mean * mean)
+    };
     // From beside the cluster on: below it, each light is a hill of its own.
-    pixels(&buffers)[24..].iter().map(of_one).collect()
+    sums[24..].iter().map(relative_variance).collect()
 }
 
 /// The largest factor between neighbours.

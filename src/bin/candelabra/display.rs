@@ -232,7 +232,7 @@ fn line_of(event: &Event) -> Option<String> {
              -> {}{}",
             *rays as f64 / seconds / 1e6,
             output.display(),
-            noise.map(|noise| format!("\n{}", told(&noise))).unwrap_or_default(),
+            noise.map(|noise| format!("; {}", told(&noise))).unwrap_or_default(),
         )),
         Event::UpToDate { frame: Some(frame), output } => {
             Some(format!("frame {frame}: {} is up to date", output.display()))
@@ -246,7 +246,7 @@ fn told(noise: &FrameNoise) -> String {
     let FrameNoise { error, bound, decibels, samples, most, capped, spoilt, .. } = *noise;
     let asked = noise.asked.map(|asked| format!("{asked} asked; ")).unwrap_or_default();
     let mut text = format!(
-        "  error {asked}{error:.4}, at most {bound:.4} with 95 % certainty ({decibels:.1} dB); \
+        "error {asked}{error:.4}, at most {bound:.4} with 95 % certainty ({decibels:.1} dB); \
          {samples:.0} samples a pixel, {most} at most"
     );
     if capped > 0 {
@@ -258,7 +258,7 @@ fn told(noise: &FrameNoise) -> String {
     }
     if let Some(Audit { pixels, error, from, to }) = noise.audit {
         text += &format!(
-            "\n  audit: {error:.4}, {from:.4} to {to:.4} with 95 % certainty, by {pixels} pixels \
+            "; audit: {error:.4}, {from:.4} to {to:.4} with 95 % certainty, by {pixels} pixels \
              rendered again"
         );
     }

@@ -13,9 +13,9 @@ use crate::render::png::exposure_for;
 use crate::render::{Progress, RenderDelegate, RenderError, RenderSettings};
 
 /// Rows of the small pictures.
-const HEIGHT: u32 = 54;
+const HEIGHT: u32 = 27;
 /// Samples of each of their pixels.
-const SAMPLES: u32 = 16;
+const SAMPLES: u32 = 8;
 
 /// A small picture of a frame.
 pub(super) struct Glimpse {

@@ -2,7 +2,7 @@
 
 use crate::light_tree::LightTree;
 use crate::math::random::hash;
-use crate::render::noise::{Grey, decibels};
+use crate::render::noise::{Grey, Halves, Reference, decibels};
 use crate::render::passes::{ErrorGoal, Planned, Reached};
 use crate::render::{Film, Progress, RenderDelegate, RenderError, RenderSettings};
 use serde::{Deserialize, Serialize};
@@ -101,16 +101,13 @@ pub(super) fn audit(
     delegate.set_settings(RenderSettings { seed, aovs: Vec::new(), ..settings.clone() });
     let mut again = delegate.film()?;
     delegate.expose(tree, frame, &mut again, &mut Planned(counts.clone()), progress)?;
+    let again = Reference::of(&again.halves(), again.window().width() as usize);
+    let own: Vec<f64> = film.halves().iter().map(Halves::luminance).collect();
     let squares: Vec<f64> = counts
         .iter()
-        .zip(film.halves().iter().zip(again.halves()))
-        .filter(|(count, (own, more))| {
-            **count > 0 && (own.variance() > 0.0 || more.variance() > 0.0)
-        })
-        .map(|(_, (own, more))| {
-            let (light, off) = (more.luminance(), own.luminance() - more.luminance());
-            grey.squared_error(off * off - more.variance(), light)
-        })
+        .zip(again.squared_errors(&own, grey))
+        .filter(|(count, square)| **count > 0 && *square != 0.0)
+        .map(|(_, square)| square)
         .collect();
     let count = squares.len().max(1) as f64;
     let mean = squares.iter().sum::<f64>() / count;

@@ -125,3 +125,93 @@ fn levels_around(wanted: f64) -> (u32, u32) {
 fn next_power(count: u32) -> u32 {
     (count + 1).next_power_of_two()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::render::noise::{Grey, Halves};
+    use proptest::prelude::*;
+
+    const WIDTH: usize = 24;
+
+    /// A picture whose left half has a thousand times the variance of its right half.
+    fn uneven(scale: f64, samples: u32) -> Estimate {
+        let pixel = |i: usize| {
+            let deviation = scale * if i % WIDTH < WIDTH / 2 { 0.1 * 1e3_f64.sqrt() } else { 0.1 };
+            let off = deviation / f64::from(samples).sqrt();
+            let means = [scale * 10.0 - off, scale * 10.0 + off];
+            Halves { counts: [samples / 2; 2], means, ..Halves::default() }
+        };
+        let pixels: Vec<Halves> = (0..WIDTH * WIDTH).map(pixel).collect();
+        Estimate::of(&pixels, WIDTH, Grey::below(scale * 10.0))
+    }
+
+    fn error_with(estimate: &Estimate, counts: &[f64]) -> f64 {
+        let squares = counts.iter().enumerate().map(|(i, n)| estimate.of_one_sample(i) / n);
+        (squares.sum::<f64>() / counts.len() as f64).sqrt()
+    }
+
+    #[test]
+    fn counts_around_a_number_are_those_of_good_nets() {
+        let low = [2, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128];
+        for pair in low.windows(2) {
+            let between = 0.5 * f64::from(pair[0] + pair[1]);
+            assert_eq!(levels_around(between), (pair[0], pair[1]));
+            assert_eq!(levels_around(pair[1].into()).1, pair[1]);
+        }
+        assert_eq!(levels_around(1.0), (2, 2));
+    }
+
+    #[test]
+    fn dithered_counts_have_the_variance_of_what_is_wanted() {
+        for wanted in [2.0, 5.5, 9.0, 17.0, 30.1, 1000.0] {
+            let masks = (0..10_000).map(|i| (f64::from(i) + 0.5) / 1e4);
+            let variance: f64 = masks.map(|mask| f64::from(dithered(wanted, mask)).recip()).sum();
+            assert!((variance / 1e4 * wanted - 1.0).abs() < 1e-3, "{wanted}");
+        }
+    }
+
+    proptest! {
+        /// What is needed for an error reaches it, whatever the unit of light; nothing cheaper of the same
+        /// shape does. Noisier pixels get more samples, and less than in proportion.
+        #[test]
+        fn what_is_needed_is_enough_and_no_more(
+            log_scale in -30.0..30.0f64,
+            log_error in -3.0..-0.5f64,
+        ) {
+            let estimate = uneven(10f64.powf(log_scale), 16);
+            let error = 10f64.powf(log_error);
+            let allotment = Allotment { least: 1, most: 1 << 28 };
+            let needed = allotment.needed(&estimate, error);
+            let reached = error_with(&estimate, &needed);
+            prop_assert!(reached <= error * 1.001, "{reached} for {error}");
+            if needed.iter().all(|&n| n > 1.0) {
+                prop_assert!(reached >= error * 0.99, "{reached} for {error}");
+                let ratio = needed[0] / needed[WIDTH - 1];
+                prop_assert!((10.0..1000.0).contains(&ratio), "{ratio}");
+            }
+            // The same number of samples, spread evenly, does worse.
+            let mean = needed.iter().sum::<f64>() / needed.len() as f64;
+            let even = error_with(&estimate, &vec![mean; needed.len()]);
+            prop_assert!(even >= reached * 0.999);
+        }
+
+        #[test]
+        fn what_can_be_afforded_is_spent(budget in 1_000u64..1_000_000) {
+            let estimate = uneven(1.0, 2);
+            let allotment = Allotment { least: 2, most: 1 << 20 };
+            let spent: f64 = allotment.affordable(&estimate, budget).iter().sum();
+            let floor = (2 * WIDTH * WIDTH) as f64;
+            prop_assert!((spent / (budget as f64).max(floor) - 1.0).abs() < 0.01);
+        }
+    }
+
+    #[test]
+    fn a_pixel_with_a_sample_left_out_gets_all_it_may() {
+        let mut pixels = vec![Halves { counts: [8; 2], means: [1.0; 2], ..Halves::default() }; 64];
+        pixels[9].is_spoilt = true;
+        let estimate = Estimate::of(&pixels, 8, Grey::below(1.0));
+        let needed = Allotment { least: 8, most: 512 }.needed(&estimate, 0.1);
+        assert_eq!((needed[9], needed[10]), (512.0, 8.0));
+    }
+}

@@ -1,17 +1,15 @@
 //! How far off a picture is from a converged one.
 
-use super::{Grey, pool};
+use super::{Grey, Halves, pool};
 use serde::Serialize;
 
-/// A picture to compare with, and what its own noise is.
+/// A picture to compare with, in two halves whose noise is independent.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Reference {
     /// Columns.
     pub width: usize,
-    /// Luminance of each pixel, row after row.
-    pub luminance: Vec<f64>,
-    /// Variance of each. It need not be smooth, but must be without bias: it is taken off.
-    pub variance: Vec<f64>,
+    /// Luminance of each pixel in each half, row after row.
+    pub halves: Vec<[f64; 2]>,
 }
 
 /// What a comparison found.
@@ -30,15 +28,25 @@ pub struct Compared {
 }
 
 impl Reference {
+    /// Of the halves of a film.
+    pub fn of(pixels: &[Halves], width: usize) -> Reference {
+        Reference { width, halves: pixels.iter().map(|pixel| pixel.means).collect() }
+    }
+
+    /// Its luminance, row after row.
+    pub fn luminance(&self) -> impl Iterator<Item = f64> + '_ {
+        self.halves.iter().map(|[a, b]| 0.5 * (a + b))
+    }
+
     /// Compares a picture, given by the luminance of its pixels. The reference's own noise is
-    /// taken off, so it may be noisier than the picture; only the result is then less certain.
+    /// taken off.
     ///
     /// # Panics
     /// If the pictures differ in size.
     pub fn compare(&self, luminance: &[f64], grey: Grey) -> Compared {
         let squares = self.squared_errors(luminance, grey);
         let noisy: Vec<usize> = (0..luminance.len())
-            .filter(|&i| self.variance[i] > 0.0 || luminance[i] != self.luminance[i])
+            .filter(|&i| self.halves[i].iter().any(|half| *half != luminance[i]))
             .collect();
         if noisy.is_empty() {
             return Compared { decibels: f64::INFINITY, ..Compared::default() };
@@ -48,12 +56,11 @@ impl Reference {
         let around = pool(&squares, self.width);
         let mut pooled: Vec<f64> = noisy.iter().map(|&i| around[i].max(0.0)).collect();
         pooled.sort_unstable_by(f64::total_cmp);
-        let sum = |values: &[f64]| values.iter().sum::<f64>();
         Compared {
             error,
             decibels: super::decibels(error),
             worst_percent: pooled[(pooled.len() - 1) * 99 / 100].sqrt(),
-            mean_off: sum(luminance) / sum(&self.luminance) - 1.0,
+            mean_off: luminance.iter().sum::<f64>() / self.luminance().sum::<f64>() - 1.0,
             noisy: noisy.len(),
         }
     }
@@ -64,12 +71,11 @@ impl Reference {
     /// # Panics
     /// If the pictures differ in size.
     pub fn squared_errors(&self, luminance: &[f64], grey: Grey) -> Vec<f64> {
-        assert_eq!(luminance.len(), self.luminance.len(), "pictures of one size");
-        let pixels = self.luminance.iter().zip(&self.variance).zip(luminance);
+        assert_eq!(luminance.len(), self.halves.len(), "pictures of one size");
+        let pixels = self.halves.iter().zip(luminance);
         pixels
-            .map(|((&light, &variance), &own)| {
-                let off = own - light;
-                grey.squared_error(off * off - variance, light)
+            .map(|(&[a, b], &own)| {
+                grey.squared_error(own, 0.5 * (a + b)) - 0.25 * grey.squared_error(a, b)
             })
             .collect()
     }

@@ -28,12 +28,11 @@ impl Halves {
         (a * self.means[0] + b * self.means[1]) / (a + b).max(1.0)
     }
 
-    /// Variance of [`luminance`](Self::luminance), without bias: a quarter of the squared difference
-    /// where the halves are equal. 0 if there is one sample.
-    pub fn variance(&self) -> f64 {
+    /// The squared error of [`luminance`](Self::luminance): a quarter of that between the halves where
+    /// they are equally large. 0 if there is one sample.
+    pub fn squared_error(&self, grey: Grey) -> f64 {
         let [a, b] = self.counts.map(f64::from);
-        let off = self.means[0] - self.means[1];
-        off * off * (a * b / ((a + b) * (a + b)).max(1.0))
+        grey.squared_error(self.means[0], self.means[1]) * (a * b / ((a + b) * (a + b)).max(1.0))
     }
 }
 
@@ -79,27 +78,24 @@ impl Estimate {
     pub fn of(pixels: &[Halves], width: usize, grey: Grey) -> Estimate {
         let around = |values: &[f64]| around(values, width, 0.0);
         let samples: Vec<f64> = pixels.iter().map(Halves::samples).collect();
-        let steadied = steadied(pixels, width);
-        let own: Vec<f64> = pixels
-            .iter()
-            .zip(&steadied)
-            .map(|(pixel, &light)| grey.squared_error(pixel.variance(), light) * pixel.samples())
-            .collect();
+        let own: Vec<f64> =
+            pixels.iter().map(|pixel| pixel.squared_error(grey) * pixel.samples()).collect();
         let blocked: Vec<f64> = pixels
             .iter()
-            .zip(&steadied)
-            .map(|(pixel, &light)| grey.squared_error(pixel.blocked, light))
+            .map(|pixel| grey.of_deviation(pixel.blocked, pixel.luminance()))
             .collect();
         let weights = around(&vec![1.0; pixels.len()]);
         let pooled = around(&own).iter().zip(&weights).map(|(sum, all)| sum / all).collect();
-        // The chance that a light is visible although none of N rays to it got there is about 1 / (N + 2).
+        // The chance that a light is visible although none of N rays to it got there: 1 / (N + 2) for any
+        // share of it that may be visible (Laplace), times the odds that it is visible at all.
         let hidden = around(&blocked)
             .iter()
             .zip(around(&samples))
             .zip(&weights)
             .map(|((blocked, samples), all)| {
                 let rays = samples / all * NEIGHBOURS;
-                if samples > 0.0 { blocked / samples / (rays + 2.0) } else { 0.0 }
+                let chance = 1.0 / (rays + 2.0) / (1.0 + rays / ODDS);
+                if samples > 0.0 { blocked / samples * chance } else { 0.0 }
             })
             .collect();
         let spoilt = pixels.iter().map(|pixel| pixel.is_spoilt).collect();
@@ -140,8 +136,7 @@ impl Estimate {
         (self.of_one_sample(pixel) / self.samples[pixel].max(1.0)).sqrt()
     }
 
-    /// The error of the frame, from the pixels' own halves: without bias but for what noise does to
-    /// the luminance that it is relative to.
+    /// The error of the frame, from the pixels' own halves.
     pub fn of_frame(&self) -> FrameError {
         let mut sums = [[0.0; 2]; LATTICES[0] * LATTICES[1]];
         for (pixel, own) in self.own.iter().enumerate() {
@@ -175,28 +170,7 @@ impl Estimate {
     }
 }
 
+/// After so many rays that were all blocked it is as likely as not that a light is hidden altogether.
+const ODDS: f64 = 500.0;
 /// Pixels in the tent, without its middle.
 const NEIGHBOURS: f64 = 48.0;
-
-/// The luminance of each pixel; where its difference from what is around it may well be noise, the luminance
-/// around it instead. An error relative to a pixel's own noisy luminance is biased: a pixel that
-/// happens to be bright would seem to be less noisy. (The shrinkage of James and Stein, 1961.)
-fn steadied(pixels: &[Halves], width: usize) -> Vec<f64> {
-    let around = |values: &[f64]| around(values, width, 0.0);
-    let light: Vec<f64> = pixels.iter().map(Halves::luminance).collect();
-    let variance: Vec<f64> = pixels.iter().map(Halves::variance).collect();
-    let weights = around(&vec![1.0; pixels.len()]);
-    let (lights, variances) = (around(&light), around(&variance));
-    (0..pixels.len())
-        .map(|i| {
-            if weights[i] == 0.0 {
-                return light[i];
-            }
-            let near = lights[i] / weights[i];
-            let off = light[i] - near;
-            let noise = (variances[i] / weights[i]).max(variance[i]);
-            let kept = if off == 0.0 { 0.0 } else { (1.0 - noise / (off * off)).max(0.0) };
-            near + kept * off
-        })
-        .collect()
-}
