@@ -64,8 +64,9 @@ fn terms(page: &mut Page, report: &Report, terms: &Terms) {
         ("pictures by each", terms.seeds.to_string()),
     ]);
     page.text(
-        "Error is the standard deviation of a pixel's luminance over that luminance plus the grey floor, and of \
-         a picture the root of the mean square of its noisy pixels. Half the error takes about four times the time.",
+        "The error of a pixel is how far it is off in the logarithm of its luminance plus the grey floor: 0.05 is 5 % of \
+         the light, or of the floor where it is darker. That of a picture is the root of the mean square of its noisy \
+         pixels. Half the error takes about four times the time.",
     );
 }
 

@@ -148,7 +148,7 @@ fn of_way(
         .par_iter()
         .map(|probe| {
             let (variance, lights) = of_probe(&picker, settings.strategy, probe);
-            (grey.squared_error(variance, probe.sum), lights)
+            (grey.of_deviation(variance, probe.sum), lights)
         })
         .collect();
     let mean =
