@@ -39,12 +39,12 @@ pub struct Asked {
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[error(
     "'{0}' is not STRATEGY[:SPLIT[:TEST]][@SAMPLES]; the strategy is uniform, power, distance, tree, \
-     exhaustive or all, SPLIT a number from 0 to 1, TEST variance or solid-angle, SAMPLES at least 2"
+     exhaustive or all, SPLIT a number from 0 to 1, TEST variance or solid-angle, SAMPLES at least 1"
 )]
 pub struct NoEntrant(String);
 
-/// A picture is made of two halves, so it has at least one sample in each.
-pub const LEAST_SAMPLES: u32 = 2;
+/// A pixel has at least one sample.
+const LEAST_SAMPLES: u32 = 1;
 /// Where there are more lights than these, weighing or sampling all of them at every point is not tried
 /// unless it is asked for: it would take most of the time.
 const FEW_LIGHTS: usize = 64;
@@ -158,7 +158,7 @@ mod tests {
     fn nonsense_is_told_with_the_remedy() {
         let wrong =
             ["", "trees", "tree:nan", "tree:2", "uniform:0.5", "tree:0.5:x", "tree:1:variance:1"];
-        for text in wrong.into_iter().chain(["tree@", "tree@1", "tree@-4", "tree@x"]) {
+        for text in wrong.into_iter().chain(["tree@", "tree@0", "tree@-4", "tree@x"]) {
             let error = text.parse::<Asked>().unwrap_err().to_string();
             assert!(error.contains("STRATEGY[:SPLIT") && error.contains(text), "{error}");
         }

@@ -104,7 +104,7 @@ fn nonsense_is_refused_before_any_work() {
         "--error 0",
         "--error nan",
         "--grey -1",
-        "--budgets 1",
+        "--budgets 0",
         "--exact --svg a.svg",
         "--frames 1-2",
         "--shot --frame 1",

@@ -7,15 +7,15 @@ use crate::stop::{STOPPED, Stop};
 use crate::{page, pilot};
 use anyhow::{Context, Result, bail};
 use candelabra::measure::{
-    self, Asked, Cache, Converged, Entrant, LEAST_SAMPLES, Machine, Onlooker, ProbeOptions, Report,
-    ShotCost, Subject, Terms, Trade, TradeError, TradeOptions, Way, at_probes,
+    self, Asked, Cache, Converged, Entrant, Machine, Onlooker, ProbeOptions, Report, ShotCost,
+    Subject, Terms, Trade, TradeError, TradeOptions, Way, at_probes,
 };
 use candelabra::pipeline::{Effort, Event, Stamper, Watch, option};
 use candelabra::render::beauty::Beauty;
 use candelabra::render::frames::Frames;
 use candelabra::render::noise::Grey;
 use candelabra::render::{LightStrategy, RenderDelegate, RenderError, RenderSettings, SplitBy};
-use candelabra::store::{check_writable, write_atomically};
+use candelabra::store::write_atomically;
 use clap::Args;
 use std::io::{IsTerminal, Write};
 use std::path::{Path, PathBuf};
@@ -31,7 +31,7 @@ pub struct Arguments {
     ways: Vec<Asked>,
     /// Samples of each pixel to try
     #[arg(long, value_name = "SAMPLES", value_delimiter = ',', default_values_t = [2, 4, 8, 16, 32, 64],
-        value_parser = clap::value_parser!(u32).range(i64::from(LEAST_SAMPLES)..=1 << 20))]
+        value_parser = clap::value_parser!(u32).range(1..=1 << 20))]
     budgets: Vec<u32>,
     /// The error that is to be reached: 0.1 for a draft, 0.05 for a preview, 0.02 for a final picture
     #[arg(long, default_value = "preview", value_parser = option::error)]
@@ -60,7 +60,7 @@ pub struct Arguments {
     #[arg(long, default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..=1 << 16))]
     seeds: u32,
     /// Samples of the picture that all are compared with; 16 times the largest budget if not given
-    #[arg(long, value_name = "SAMPLES", value_parser = clap::value_parser!(u32).range(i64::from(LEAST_SAMPLES)..=1 << 24))]
+    #[arg(long, value_name = "SAMPLES", value_parser = clap::value_parser!(u32).range(2..=1 << 24))]
     reference_spp: Option<u32>,
     /// The luminance below which error is absolute; a tenth of the picture's middle if not given
     #[arg(long, value_name = "LUMINANCE", value_parser = option::grey)]
@@ -134,7 +134,6 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let files = streams.filter(|file| !is_stdout(file)).chain(&arguments.svg);
     for file in files.chain(&arguments.html) {
         page::check(file, &[arguments.scene.scene()])?;
-        check_writable(file)?;
     }
     if let Some(threads) = arguments.threads {
         rayon::ThreadPoolBuilder::new().num_threads(threads.into()).build_global()?;
@@ -155,7 +154,12 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     };
     match (outcome, stop.signal()) {
         (Err(error), Some(signal)) if is_stop(&error) => {
-            say("stopped: what is finished is kept, and the same command goes on from there");
+            say(match arguments.shot {
+                true => "stopped",
+                false => {
+                    "stopped: what is finished is kept, and the same command goes on from there"
+                }
+            });
             Ok((STOPPED + signal).into())
         }
         (outcome, _) => outcome.map(|()| ExitCode::SUCCESS),
@@ -214,12 +218,15 @@ fn measure(arguments: &Arguments, display: &Display) -> Result<Measured> {
             seed,
         };
         report.exact = Some(at_probes(&delegate, &shot.tree, shot.frame, &options)?);
+        if display.is_stopped() {
+            return Err(RenderError::Stopped.into());
+        }
     }
     if arguments.exact {
         return Ok((report, None));
     }
     let entrants = entrants(arguments, report.lights);
-    let most = entrants.iter().map(|entrant| entrant.samples).max().unwrap_or(LEAST_SAMPLES);
+    let most = entrants.iter().map(|entrant| entrant.samples).max().unwrap_or(1);
     let options = TradeOptions {
         entrants,
         seeds: arguments.seeds,
