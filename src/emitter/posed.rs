@@ -4,6 +4,7 @@ use super::set::{EmitterPlace, Emitters};
 use super::sphere::WorldSphere;
 use super::triangle::WorldTriangle;
 use crate::math::angle::OffAxis;
+use crate::math::built_in;
 use crate::math::color::Rgb;
 use crate::math::directions::{aim, mirrors};
 use crate::scene::{Instance, Light, LightKind, Material, Pose, Scene, Shaping};
@@ -129,7 +130,10 @@ impl<'a> PosedEmitters<'a> {
         let distance = to_light.length();
         let direction = to_light.try_normalize()?;
         let profile = self.profile(shaping, light.node, to_light);
-        let ratio = light.range_m.map_or(0.0, |range| distance / f64::from(range));
+        let ratio = light
+            .range_m
+            .filter(|_| built_in::RANGE)
+            .map_or(0.0, |range| distance / f64::from(range));
         let window = (1.0 - ratio.powi(4)).max(0.0);
         let radiance = intensity_cd * profile * (window / (distance * distance)) as f32;
         radiance.is_finite().then_some(LightSample {
@@ -200,7 +204,9 @@ impl<'a> PosedEmitters<'a> {
             return Rgb::ZERO;
         }
         let mut radiance = self.scene.rgb_of_instance(row, self.pose);
-        if let Some(usage) = material.emission_texture {
+        if built_in::TEXTURES
+            && let Some(usage) = material.emission_texture
+        {
             let mesh = &self.scene.meshes[instance.mesh as usize];
             if let Some(uvs) = mesh.uv_sets.get(usage.uv_set as usize).filter(|set| !set.is_empty())
             {

@@ -8,12 +8,14 @@
 //! |---|---|
 //! | `report` | a tree file, its trees by kind and its heaviest lights |
 //! | `shape` | how deep, how full and how good a tree is |
-//! | `scene` | what is in a scene, and what it requires |
+//! | `scene` | what is in a scene |
+//! | `features` | what a scene requires, and what that switches on |
 //! | `walk` | every cluster and emitter of a frame as it stands in the world |
 //! | `dot` | the top of a tree for Graphviz |
 //! | `html` | the page |
 
 mod dot;
+mod features;
 mod html;
 mod report;
 mod scene;
@@ -21,9 +23,10 @@ mod shape;
 mod walk;
 
 pub use dot::dot;
+pub use features::{Feature, FeatureState};
 pub use html::html;
 pub use report::{FrameSpan, LightReport, SectionReport, TreeReport};
-pub use scene::{CameraReport, SceneReport};
+pub use scene::{CameraReport, LightGroupReport, SceneReport};
 pub use shape::{Shape, shapes};
 
 /// The version of the reports as JSON. Within a version fields may be added, and none changes or is

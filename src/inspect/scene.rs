@@ -1,9 +1,11 @@
-//! What is in a scene, and what it requires.
+//! What is in a scene.
 
 use super::VERSION;
+use super::features::{Feature, features};
 use super::report::FrameSpan;
-use crate::emitter::Emitters;
+use crate::emitter::{Emitters, infinite_lights};
 use crate::pipeline;
+use crate::render::LightGroups;
 use crate::scene::{Camera, Note, Projection, Requirements, Scene};
 use serde::Serialize;
 
@@ -40,10 +42,42 @@ pub struct SceneReport {
     pub emitters: usize,
     /// Emitters of lights that change with time.
     pub changing: usize,
-    /// The features that it switches on, with counts.
+    /// How many it has of each feature.
     pub requires: Requirements,
+    /// Every feature: whether that switches it on, and what it costs.
+    pub features: Vec<Feature>,
+    /// Its light groups, by name; none if it puts no light in one.
+    pub light_groups: Vec<LightGroupReport>,
     /// What was left out, mended or approximated, by category.
     pub notes: Vec<Note>,
+}
+
+/// A light group.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct LightGroupReport {
+    /// Its name.
+    pub name: String,
+    /// How many lights are in it.
+    pub lights: usize,
+}
+
+impl LightGroupReport {
+    /// The groups that a scene gives its lights. None, too, if they are more than are written.
+    fn all(scene: &Scene, emitters: &Emitters) -> Vec<LightGroupReport> {
+        if scene.light_groups.is_empty() {
+            return Vec::new();
+        }
+        let Ok(groups) = LightGroups::new(scene, emitters, &[]) else { return Vec::new() };
+        let named = groups.names().iter().cloned();
+        let mut reports: Vec<_> = named.map(|name| LightGroupReport { name, lights: 0 }).collect();
+        for light in emitters.lights() {
+            reports[groups.of_emitter(emitters, light.first)].lights += 1;
+        }
+        for light in infinite_lights(scene, &scene.pose_at(0.0)) {
+            reports[groups.of_infinite(&light)].lights += 1;
+        }
+        reports
+    }
 }
 
 /// A camera.
@@ -74,6 +108,7 @@ impl SceneReport {
     pub fn of(scene: &Scene, emitters: &Emitters) -> SceneReport {
         let triangles_of = |mesh: u32| scene.meshes[mesh as usize].triangles.len();
         let frames = pipeline::frames_of(scene);
+        let light_groups = LightGroupReport::all(scene, emitters);
         SceneReport {
             schema: "candelabra.scene",
             version: VERSION,
@@ -94,32 +129,9 @@ impl SceneReport {
             emitters: emitters.len(),
             changing: emitters.changing_count(),
             requires: scene.requirements(),
+            features: features(scene, emitters, frames.len(), light_groups.len()),
+            light_groups,
             notes: scene.notes.clone(),
         }
-    }
-
-    /// The features that it switches on, in words, with counts.
-    pub fn features(&self) -> impl Iterator<Item = (usize, &'static str)> {
-        let needs = &self.requires;
-        let features = [
-            (needs.mesh_lights, "mesh lights"),
-            (needs.textured_mesh_lights, "textured mesh lights"),
-            (needs.shaped_lights, "emission profiles"),
-            (needs.varying_lights, "lights that vary"),
-            (needs.spheres, "sphere lights"),
-            (needs.points, "point lights"),
-            (needs.spots, "spot lights"),
-            (needs.suns, "suns"),
-            (needs.domes, "domes"),
-            (needs.shared_meshes, "meshes shared by instances"),
-            (needs.animated_nodes, "animated nodes"),
-            (needs.textures, "textures"),
-            (needs.cutouts, "cut-out materials"),
-            (needs.normal_maps, "normal maps"),
-            (needs.fog, "fog"),
-            (needs.lenses, "camera lenses"),
-            (needs.orthographic_cameras, "orthographic cameras"),
-        ];
-        features.into_iter().filter(|(count, _)| *count > 0)
     }
 }

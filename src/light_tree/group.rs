@@ -10,6 +10,7 @@ use super::node::{self, Link, Node};
 use super::viewer::Viewer;
 use super::wide;
 use crate::bounds::LightBounds;
+use crate::math::built_in;
 use bytemuck::{Pod, Zeroable};
 
 /// Children of a cluster.
@@ -121,7 +122,7 @@ impl Group {
     }
 
     #[inline(always)]
-    pub(super) fn decode(&self) -> Lanes {
+    fn decode<const ENDLESS: bool>(&self) -> Lanes {
         let half_extent = |axis: usize| {
             each(|lane| {
                 f32::from(self.half_extent[axis][lane]) * node::scale(self.half_exponent[lane])
@@ -131,7 +132,6 @@ impl Group {
         for (lane, (&i, &j)) in self.axis[0].iter().zip(&self.axis[1]).enumerate() {
             [x[lane], y[lane], z[lane]] = node::decode_axis([i, j]);
         }
-        let is_endless = self.range == [0; WIDTH];
         Lanes {
             center: self.center,
             half_extent: [half_extent(0), half_extent(1), half_extent(2)],
@@ -139,7 +139,7 @@ impl Group {
             sin_half_theta_o: each(|lane| node::decode_sin_half_theta_o(self.theta_o[lane])),
             cos_theta_e: each(|lane| node::decode_cos_theta_e(self.theta_e[lane])),
             two_sided: each(|lane| u32::from(node::is_two_sided(self.theta_o[lane]))),
-            inverse_range2: if is_endless {
+            inverse_range2: if ENDLESS {
                 [0.0; WIDTH]
             } else {
                 each(|lane| node::decode_inverse_range2(self.range[lane]))
@@ -173,12 +173,22 @@ impl Group {
 
     #[inline(always)]
     pub(super) fn weigh_lanes(&self, viewer: &impl Viewer) -> ([f64; WIDTH], [f32; WIDTH]) {
+        // Written once and compiled twice: few scenes have a light with a range.
+        match !built_in::RANGE || self.range == [0; WIDTH] {
+            true => self.weigh_as::<true>(viewer),
+            false => self.weigh_as::<false>(viewer),
+        }
+    }
+
+    /// `ENDLESS` if no lane has a range.
+    #[inline(always)]
+    fn weigh_as<const ENDLESS: bool>(&self, viewer: &impl Viewer) -> ([f64; WIDTH], [f32; WIDTH]) {
         // Each quantity has an array over the lanes, so that the compiler computes all lanes together.
         let (mut products, mut decays, mut spreads) = ([0.0; WIDTH], [0.0; WIDTH], [0.0; WIDTH]);
         let mut sights = Sights::default();
-        let lanes = self.decode();
+        let lanes = self.decode::<ENDLESS>();
         for lane in 0..WIDTH {
-            let factors = viewer.factors(&lanes.cluster(lane));
+            let factors = viewer.factors(&lanes.cluster::<ENDLESS>(lane));
             (products[lane], decays[lane]) = (factors.product, factors.decay);
             spreads[lane] = factors.spread;
             sights.set(lane, &factors.sight);
@@ -198,7 +208,7 @@ impl Group {
 
 impl Lanes {
     #[inline(always)]
-    pub(super) fn cluster(&self, lane: usize) -> Cluster {
+    fn cluster<const ENDLESS: bool>(&self, lane: usize) -> Cluster {
         let of = |field: &[[f32; WIDTH]; 3]| [field[0][lane], field[1][lane], field[2][lane]];
         Cluster {
             center: of(&self.center),
@@ -207,7 +217,7 @@ impl Lanes {
             sin_half_theta_o: self.sin_half_theta_o[lane],
             cos_theta_e: self.cos_theta_e[lane],
             two_sided: self.two_sided[lane] != 0,
-            inverse_range2: self.inverse_range2[lane],
+            inverse_range2: if ENDLESS { 0.0 } else { self.inverse_range2[lane] },
         }
     }
 }

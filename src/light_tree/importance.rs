@@ -109,7 +109,9 @@ impl Cluster {
     pub fn window(&self, nearest2: f32) -> f32 {
         let ratio2 = nearest2 * self.inverse_range2;
         let window = (1.0 - ratio2 * ratio2).max(FLOOR);
-        if ratio2 > 1.0 + RANGE_SLACK { 0.0 } else { window }
+        let window = if ratio2 > 1.0 + RANGE_SLACK { 0.0 } else { window };
+        // Where it is known while compiling that there is no range, nothing else is left of this.
+        if self.inverse_range2 == 0.0 { 1.0 } else { window }
     }
 }
 

@@ -13,6 +13,7 @@ use super::node::Link;
 use super::sampling::FrameTree;
 use super::splitting::BELOW_ONE;
 use super::viewer::Viewer;
+use crate::math::built_in;
 
 /// A group of a tree, and the viewer in that tree's space.
 #[derive(Clone, Copy, Debug)]
@@ -50,7 +51,9 @@ impl FrameTree<'_> {
     pub(super) fn weigh<V: Viewer>(&self, place: &Place<V>) -> Option<Weighed<'_>> {
         let group = self.groups.get(place.at as usize)?;
         let (mut importances, spreads) = group.weigh(&place.viewer);
-        importances.iter_mut().for_each(|importance| *importance *= place.unit);
+        if built_in::INSTANCES {
+            importances.iter_mut().for_each(|importance| *importance *= place.unit);
+        }
         Some(Weighed { group, importances, spreads })
     }
 
@@ -102,8 +105,10 @@ impl FrameTree<'_> {
                 let emitter = place.first_emitter.checked_add(own)?;
                 (emitter < self.emitter_count).then_some(Next::Emitter(emitter))
             }
-            Link::Instance(row) => self.enter(place, row, group.energy(lane)).map(Next::Group),
-            Link::Nothing => None,
+            Link::Instance(row) if built_in::INSTANCES => {
+                self.enter(place, row, group.energy(lane)).map(Next::Group)
+            }
+            Link::Instance(_) | Link::Nothing => None,
         }
     }
 

@@ -13,6 +13,7 @@ use super::place::{Next, Place, Weighed};
 use super::records::{InstanceRow, LightRow, TreeRow};
 use super::tree::{LightTree, NoSuchFrame};
 use super::viewer::Viewer;
+use crate::math::built_in;
 
 /// One light, picked.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -56,7 +57,7 @@ impl<D: AsRef<[u8]>> LightTree<D> {
         let root = root.filter(|&row| (row as usize) < self.trees().len());
         let changing = self.first_of_class(LightRow::CHANGES);
         let placed = self.first_of_class(LightRow::CHANGES | LightRow::PLACED);
-        let own = root.filter(|_| !self.frames().is_empty());
+        let own = root.filter(|_| built_in::MOTION && !self.frames().is_empty());
         let own = own.map(|row| self.leaves_of(&self.trees()[row as usize], changing..placed));
         let forced = forced.iter().filter_map(|&instance| {
             let row = self.instances().get(instance as usize)?;

@@ -9,6 +9,8 @@
 //! samples as clusters takes them all, and everything between varies smoothly. (Cuts: Walter et al.
 //! 2005. Sampling them: Yuksel 2019, "Stochastic Lightcuts".) The seed's own rule stays for comparison.
 
+use crate::math::built_in;
+
 /// How splitting is asked for.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Splitting {
@@ -50,7 +52,7 @@ impl Splitting {
 
     /// Whether the tree is not opened at all.
     pub fn is_off(&self) -> bool {
-        self.knob <= 0.0
+        !built_in::SPLITTING || self.knob <= 0.0
     }
 
     /// Whether it is opened to the last emitter.

@@ -7,6 +7,7 @@
 //! nothing else.
 
 pub mod angle;
+pub mod built_in;
 pub mod color;
 pub mod directions;
 mod frame;

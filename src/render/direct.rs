@@ -4,6 +4,7 @@ use super::path::{Integrator, PathScratch, Vertex};
 use super::picker::{LightPick, Wanted};
 use super::rays::Anchor;
 use crate::light_tree::Picked;
+use crate::math::built_in;
 use crate::math::color::{Rgb, luminance};
 use crate::math::random::hash;
 use glam::{Vec2, Vec3};
@@ -136,7 +137,7 @@ impl Integrator<'_> {
             return Rgb::ZERO;
         }
         let through = |fog: &super::fog::Fog| fog.transmittance(at.position, direction, length);
-        self.fog.as_ref().map_or(Rgb::ONE, through)
+        self.fog.as_ref().filter(|_| built_in::FOG).map_or(Rgb::ONE, through)
     }
 }
 

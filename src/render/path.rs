@@ -17,6 +17,7 @@ use super::settings::RenderSettings;
 use super::surface::Surfaces;
 use crate::emitter::{EmitterHit, InfiniteLight, PosedEmitters};
 use crate::light_tree::{Glossy, Lobes, Picked, Receiver};
+use crate::math::built_in;
 use crate::math::color::Rgb;
 use crate::math::random::{Sampler, hash};
 use crate::scene::Visibility;
@@ -155,7 +156,9 @@ impl Integrator<'_> {
             let ray = (origin, direction, reach_m);
             let Seen { hit, in_shade } = self.tracer.look(sender, ray, &accept, &mut lights);
             reach_m = f32::INFINITY;
-            if let Some(fog) = &self.fog {
+            if built_in::FOG
+                && let Some(fog) = &self.fog
+            {
                 let length = hit.as_ref().map_or(f32::INFINITY, |hit| hit.t);
                 if bounce < self.settings.depth {
                     let (numbers, salt) = (sampler.next_4d(), hash(seed, !bounce));
@@ -277,7 +280,7 @@ impl Integrator<'_> {
     /// The share of light that fog lets through along a stretch of a ray.
     fn through_fog(&self, origin: Vec3, direction: Vec3, length: f32) -> Rgb {
         let through = |fog: &Fog| fog.transmittance(origin, direction, length);
-        self.fog.as_ref().map_or(Rgb::ONE, through)
+        self.fog.as_ref().filter(|_| built_in::FOG).map_or(Rgb::ONE, through)
     }
 
     /// The part of a light's contribution that goes to its group.
@@ -343,7 +346,7 @@ impl Integrator<'_> {
         scratch: &mut PathScratch,
     ) -> Rgb {
         let mut sum = Rgb::ZERO;
-        for (row, light) in self.infinite.iter().enumerate() {
+        for (row, light) in self.infinite.iter().enumerate().filter(|_| built_in::DOMES) {
             let Visibility { camera, reflections, .. } = light.visibility;
             let meets = if before.is_none() { camera } else { reflections };
             let radiance = if meets { light.radiance(direction) } else { Rgb::ZERO };
@@ -382,7 +385,8 @@ impl Vertex {
     /// sampler, a direction is sampled from the BSDF.
     pub fn wanted(&self, sampler: Option<&mut Sampler>) -> Wanted {
         let receiver = self.receiver;
-        let is_glossy = |lobes: &Lobes| lobes.at_normal + lobes.toward_grazing > 0.0;
+        let is_glossy =
+            |lobes: &Lobes| built_in::GLOSSY && lobes.at_normal + lobes.toward_grazing > 0.0;
         let Some(lobes) = self.reflection.lobes().filter(is_glossy) else {
             return Wanted::At(receiver);
         };

@@ -10,6 +10,7 @@ use crate::light_tree::{
     DistanceOnly, FrameTree, Glossy, Moments, Pick, Picked, Receiver, Scratch, Segment, SplitTest,
     Splitting, Viewer,
 };
+use crate::math::built_in;
 use crate::math::random::{hash, widen};
 use glam::Vec3;
 
@@ -203,7 +204,7 @@ impl<'a> LightPicker<'a> {
             let (probability, expected) = (pick.probability, pick.expected);
             visit(LightPick { light: pick.light, probability, expected });
         };
-        if self.splitting.is_off() && beside.is_empty() {
+        if self.splitting.is_off() && (beside.is_empty() || !built_in::DOMES) {
             self.tree.sample(viewer, u).into_iter().for_each(visit);
         } else {
             self.tree.for_each_pick(
@@ -326,7 +327,8 @@ impl<'a> LightPicker<'a> {
     /// The importances of the lights at infinity, in the unit of the tree's.
     fn weigh_infinite(&self, wanted: &Wanted, importances: &mut Vec<f64>) {
         importances.clear();
-        importances.extend(self.infinite.iter().map(|light| match light.forced {
+        let infinite = self.infinite.iter().filter(|_| built_in::DOMES);
+        importances.extend(infinite.map(|light| match light.forced {
             true => 0.0,
             false => importance_of(light, wanted),
         }));

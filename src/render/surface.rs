@@ -12,9 +12,9 @@
 
 use super::bsdf::{Bsdf, SurfaceSample};
 use super::rays::Anchor;
-use crate::math::Frame;
 use crate::math::color::Rgb;
 use crate::math::directions::mirrors;
+use crate::math::{Frame, built_in};
 use crate::scene::{AlphaMode, Material, Mesh, Pose, Scene, TextureUse};
 use glam::{Affine3A, DMat3, DVec3, Vec2, Vec3, Vec4};
 use std::ops::{Add, Mul};
@@ -111,11 +111,11 @@ impl<'a> Surfaces<'a> {
     #[inline]
     fn lookup(&self, at: &At, texture: &Option<TextureUse>) -> Vec4 {
         match texture {
-            Some(used) => {
+            Some(used) if built_in::TEXTURES => {
                 let uv = used.map(at.interpolate(at.uv_set(used)));
                 self.scene.textures[used.texture as usize].lookup(uv)
             }
-            None => Vec4::ONE,
+            _ => Vec4::ONE,
         }
     }
 
@@ -153,10 +153,12 @@ impl<'a> Surfaces<'a> {
             let normal = across.try_normalize().map_or(flat, |across| across.as_vec3());
             if normal.dot(flat) < 0.0 { -normal } else { normal }
         };
-        let Some(used) = &material.normal_texture else { return smooth };
+        let Some(used) = material.normal_texture.filter(|_| built_in::TEXTURES) else {
+            return smooth;
+        };
         let texel = self.lookup(at, &material.normal_texture).truncate() * 2.0 - 1.0;
         let bent = texel * Vec3::new(material.normal_scale, material.normal_scale, 1.0);
-        let Some((tangent, turn)) = at.tangent(used) else { return smooth };
+        let Some((tangent, turn)) = at.tangent(&used) else { return smooth };
         let tangent = (matrix * tangent).reject_from_normalized(smooth.as_dvec3());
         let Some(tangent) = tangent.try_normalize().map(|tangent| tangent.as_vec3()) else {
             return smooth;

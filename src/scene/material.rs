@@ -83,6 +83,11 @@ impl Default for Material {
 }
 
 impl Material {
+    /// Whether it has a specular lobe. Without one it is Lambertian.
+    pub fn is_glossy(&self) -> bool {
+        self.specular > 0.0 || self.metallic > 0.0
+    }
+
     /// Whether any light can leave this surface of its own.
     pub fn emits(&self) -> bool {
         self.emission_nits.max_element() > 0.0

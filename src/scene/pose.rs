@@ -3,6 +3,7 @@
 //! A key counts as at a frame's time if it is [meant to be](Timeline::is_same).
 
 use super::{Scene, Timeline};
+use crate::math::built_in;
 use crate::math::color::Rgb;
 use glam::{Affine3A, DAffine3, DQuat, DVec3, Quat, Vec3};
 
@@ -114,13 +115,13 @@ impl Pose {
     /// The strength of a light that varies, in its own unit: candela, nits or lux.
     #[inline]
     pub fn light_rgb(&self, light: u32) -> Option<Rgb> {
-        self.light_rgb.get(light as usize).copied().flatten()
+        self.light_rgb.get(light as usize).copied().flatten().filter(|_| built_in::MOTION)
     }
 
     /// The emission of a mesh light that varies, nits, before its texture.
     #[inline]
     pub fn instance_rgb(&self, instance: u32) -> Option<Rgb> {
-        self.instance_rgb.get(instance as usize).copied().flatten()
+        self.instance_rgb.get(instance as usize).copied().flatten().filter(|_| built_in::MOTION)
     }
 
     /// Local to world for a node, from [`Scene::origin`] on.
@@ -146,7 +147,7 @@ pub(super) fn moving(nodes: &[Node]) -> Vec<bool> {
     let mut moves: Vec<bool> = Vec::with_capacity(nodes.len());
     for node in nodes {
         let carried = node.parent.is_some_and(|parent| moves[parent as usize]);
-        moves.push(carried || !node.channels.is_empty());
+        moves.push(built_in::MOTION && (carried || !node.channels.is_empty()));
     }
     moves
 }

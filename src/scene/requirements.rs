@@ -1,6 +1,6 @@
 //! What a scene needs of the tree and the renderer.
 
-use super::{AlphaMode, Camera, Keys, LightKind, Projection, Scene};
+use super::{AlphaMode, Camera, Keys, LightKind, Projection, Scene, Visibility};
 use serde::Serialize;
 
 /// The features that a scene switches on. What is false or zero here costs nothing anywhere.
@@ -24,6 +24,14 @@ pub struct Requirements {
     pub suns: usize,
     /// Domes.
     pub domes: usize,
+    /// Domes with a picture.
+    pub pictured_domes: usize,
+    /// Lights that are dark beyond a distance.
+    pub ranges: usize,
+    /// Mesh lights and other lights that are sampled at every point.
+    pub forced: usize,
+    /// Mesh lights, spheres and lights at infinity that some rays do not meet.
+    pub hidden: usize,
     /// Meshes that more than one instance shares.
     pub shared_meshes: usize,
     /// Nodes that move.
@@ -32,9 +40,11 @@ pub struct Requirements {
     pub cutouts: usize,
     /// Materials with a normal map.
     pub normal_maps: usize,
+    /// Materials with a specular lobe, and one for all meshes without a material.
+    pub glossy: usize,
     /// Images.
     pub textures: usize,
-    /// Homogeneous fog.
+    /// Homogeneous fog, 0 or 1.
     pub fog: usize,
     /// Cameras with a lens.
     pub lenses: usize,
@@ -56,27 +66,41 @@ impl Requirements {
                     usize::from(instance.values.as_ref().is_some_and(Keys::varies));
                 needs.textured_mesh_lights += usize::from(material.emission_texture.is_some());
                 needs.shaped_lights += usize::from(instance.shaping.is_some());
+                needs.forced += usize::from(instance.forced);
+                needs.hidden += usize::from(instance.visibility != Visibility::ALL);
             }
         }
         needs.shared_meshes = uses.iter().filter(|&&count| count > 1).count();
         for light in &scene.lights {
             needs.varying_lights += usize::from(light.values.as_ref().is_some_and(Keys::varies));
+            needs.ranges += usize::from(light.range_m.is_some());
+            needs.forced += usize::from(light.forced);
             match light.kind {
                 LightKind::Point { .. } => needs.points += 1,
                 LightKind::Spot { .. } => needs.spots += 1,
                 LightKind::Sphere { shaping, .. } => {
                     needs.spheres += 1;
                     needs.shaped_lights += usize::from(shaping.is_some());
+                    needs.hidden += usize::from(light.visibility != Visibility::ALL);
                 }
                 LightKind::Distant { .. } => needs.suns += 1,
-                LightKind::Dome { .. } => needs.domes += 1,
+                LightKind::Dome { texture, .. } => {
+                    needs.domes += 1;
+                    needs.pictured_domes += usize::from(texture.is_some());
+                }
+            }
+            if light.kind.is_infinite() {
+                needs.hidden +=
+                    usize::from(!light.visibility.camera || !light.visibility.reflections);
             }
         }
         needs.animated_nodes = scene.nodes.iter().filter(|n| !n.channels.is_empty()).count();
         for material in &scene.materials {
             needs.cutouts += usize::from(material.alpha_mode != AlphaMode::Opaque);
             needs.normal_maps += usize::from(material.normal_texture.is_some());
+            needs.glossy += usize::from(material.is_glossy());
         }
+        needs.glossy += usize::from(scene.meshes.iter().any(|mesh| mesh.material.is_none()));
         needs.fog = usize::from(scene.medium.is_some());
         needs.lenses = scene.cameras.iter().filter(|c| c.lens_radius_m > 0.0).count();
         let is_parallel = |c: &&Camera| matches!(c.projection, Projection::Orthographic { .. });

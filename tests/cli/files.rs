@@ -4,6 +4,8 @@ use assert_cmd::Command;
 use serde_json::{Value, json};
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::process::{self, Stdio};
+use std::time::{Duration, Instant};
 use tempfile::TempDir;
 
 /// A folder of its own, with a scene in it, in which the programs are run.
@@ -171,13 +173,21 @@ impl Shot {
 
     /// `candelabra-render`, likewise; small and quick unless told otherwise.
     pub fn render(&self, arguments: &str) -> Told {
-        let mut all = format!("{SCENE} {arguments} --threads 1");
-        for (name, value) in [("--res", "12x8"), ("--spp", "2"), ("--depth", "1")] {
-            if !arguments.split_whitespace().any(|word| word == name) {
-                all += &format!(" {name} {value}");
-            }
+        self.run(env!("CARGO_BIN_EXE_candelabra-render"), &quick(arguments))
+    }
+
+    /// The same, told to stop after some time. How it ended.
+    pub fn render_for(&self, arguments: &str, patience: Duration) -> Option<i32> {
+        let mut command = process::Command::new(env!("CARGO_BIN_EXE_candelabra-render"));
+        command.current_dir(self.folder.path()).args(quick(arguments).split_whitespace());
+        let mut child = command.stdout(Stdio::null()).stderr(Stdio::null()).spawn().unwrap();
+        let started = Instant::now();
+        while started.elapsed() < patience && child.try_wait().unwrap().is_none() {
+            std::thread::sleep(Duration::from_millis(5));
         }
-        self.run(env!("CARGO_BIN_EXE_candelabra-render"), &all)
+        // It may have ended by itself meanwhile.
+        let _ = process::Command::new("kill").args(["-TERM", &child.id().to_string()]).output();
+        child.wait().unwrap().code()
     }
 
     fn run(&self, program: &str, arguments: &str) -> Told {
@@ -190,6 +200,19 @@ impl Shot {
             err: String::from_utf8(output.stderr).unwrap(),
         }
     }
+}
+
+/// Arguments of the renderer that ask for little work, where they do not say how much.
+fn quick(arguments: &str) -> String {
+    let is_given = |names: &[&str]| arguments.split_whitespace().any(|word| names.contains(&word));
+    let mut all = format!("{SCENE} {arguments} --threads 1");
+    let effort = ["--spp", "--max-spp", "--error", "--time", "--plan"];
+    for (names, value) in [(&["--res"][..], "12x8"), (&effort, "2"), (&["--depth"], "1")] {
+        if !is_given(names) {
+            all += &format!(" {} {value}", names[0]);
+        }
+    }
+    all
 }
 
 /// What a program said, and how it ended.

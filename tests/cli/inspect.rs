@@ -90,6 +90,121 @@ fn a_scene_as_json_says_what_it_requires() {
     assert_eq!(report["frames"]["count"], 25);
 }
 
+/// What a report says of a feature: how many are found, whether it is on, and its bytes.
+fn feature(report: &Value, name: &str) -> (u64, String, Option<u64>) {
+    let features = report["features"].as_array().unwrap();
+    let row = features.iter().find(|row| row["name"] == name).unwrap_or_else(|| panic!("{name}"));
+    (row["found"].as_u64().unwrap(), row["state"].as_str().unwrap().into(), row["bytes"].as_u64())
+}
+
+#[test]
+fn what_a_scene_lacks_is_off_and_costs_nothing() {
+    let report = json_of(&Shot::still(), &format!("inspect {SCENE} --json"));
+    let (mut on, mut off) = (Vec::new(), 0);
+    for row in report["features"].as_array().unwrap() {
+        match row["state"].as_str().unwrap() {
+            "on" => on.push(row["name"].as_str().unwrap()),
+            state => {
+                off += 1;
+                let is_nothing = row["found"] == 0 && row["bytes"].is_null();
+                assert!(state == "off" && (is_nothing || !row["note"].is_null()), "{row}");
+            }
+        }
+    }
+    // The default knob splits between the lamp's two triangles.
+    assert_eq!(on, ["mesh lights", "splitting", "glossy materials"]);
+    assert!(off > 15, "{report}");
+    assert_eq!(report["light_groups"], json!([]));
+}
+
+#[test]
+fn the_tree_of_a_plain_scene_has_no_section_for_what_it_lacks() {
+    let report = json_of(&lamps(8), "inspect shot.ltree --json");
+    let mut ids: Vec<&str> =
+        report["sections"].as_array().unwrap().iter().map(|s| s["id"].as_str().unwrap()).collect();
+    ids.sort();
+    assert_eq!(ids, ["GRUP", "LGHT", "META", "PATH", "TREE"]);
+}
+
+#[test]
+fn textures_that_no_light_uses_are_not_baked() {
+    let shot = Shot::still().with_picture_file();
+    let report = json_of(&shot, &format!("inspect {SCENE} --json"));
+    assert_eq!(feature(&report, "textures"), (1, "on".into(), Some(4 * 4 * 4)));
+    assert_eq!(feature(&report, "textured mesh lights"), (0, "off".into(), None));
+    shot.candelabra(&format!("inspect {SCENE}")).ends(0).says("none on emitters");
+}
+
+#[test]
+fn a_texture_on_a_light_is_baked_into_as_many_bytes_as_the_report_says() {
+    let mut shot = Shot::still().with_picture_file();
+    shot.edit(|json| json["materials"][1]["emissiveTexture"] = json!({"index": 0}));
+    let report = json_of(&shot, &format!("inspect {SCENE} --json"));
+    let (found, state, bytes) = feature(&report, "textured mesh lights");
+    assert_eq!((found, state.as_str()), (1, "on"));
+    shot.candelabra(&format!("build {SCENE}")).ends(0);
+    let tree = json_of(&shot, "inspect shot.ltree --json");
+    let sections = tree["sections"].as_array().unwrap().iter();
+    let baked =
+        sections.filter(|section| ["TXTR", "MEAN"].contains(&section["id"].as_str().unwrap()));
+    assert_eq!(bytes, Some(baked.map(|section| section["bytes"].as_u64().unwrap()).sum()));
+}
+
+#[test]
+fn a_texture_that_nothing_uses_is_off() {
+    let mut shot = Shot::still().with_picture_file();
+    shot.edit(|json| {
+        json["materials"][0]["pbrMetallicRoughness"] = json!({"metallicFactor": 0});
+        // The wall does not emit.
+        json["materials"][0]["emissiveTexture"] = json!({"index": 0});
+    });
+    let report = json_of(&shot, &format!("inspect {SCENE} --json"));
+    assert!(
+        matches!(feature(&report, "textures"), (0 | 1, state, None) if state == "off"),
+        "{report}"
+    );
+}
+
+#[test]
+fn one_light_that_moves_switches_on_the_rows_of_all_frames() {
+    let shot = Shot::moving();
+    let report = json_of(&shot, &format!("inspect {SCENE} --json"));
+    let (found, state, bytes) = feature(&report, "lights that move or vary");
+    assert_eq!((found, state.as_str()), (1, "on"));
+    shot.candelabra(&format!("build {SCENE}")).ends(0);
+    let tree = json_of(&shot, "inspect shot.ltree --json");
+    let sections = tree["sections"].as_array().unwrap().iter();
+    let rows =
+        sections.filter(|section| ["FRAM", "FPRT"].contains(&section["id"].as_str().unwrap()));
+    assert_eq!(bytes, Some(rows.map(|section| section["bytes"].as_u64().unwrap()).sum()));
+}
+
+#[test]
+fn fog_is_on_where_it_is() {
+    let mut shot = Shot::still();
+    shot.edit(|json| json["scenes"][0]["extras"] = json!({"usdFog": {"extinction": 0.1}}));
+    let report = json_of(&shot, &format!("inspect {SCENE} --json"));
+    assert_eq!(feature(&report, "fog"), (1, "on".into(), None));
+}
+
+#[test]
+fn light_groups_are_listed_with_their_lights() {
+    let mut shot = lamps(3);
+    shot.edit(|json| {
+        for node in json["nodes"].as_array_mut().unwrap().iter_mut().rev().take(2) {
+            node["extras"] = json!({"usdLux": {"type": "SphereLight", "group": "key"}});
+        }
+    });
+    let report = json_of(&shot, &format!("inspect {SCENE} --json"));
+    let groups = json!([{"name": "default", "lights": 1}, {"name": "key", "lights": 2}]);
+    assert_eq!(report["light_groups"], groups);
+    assert_eq!(feature(&report, "light groups").1, "offered");
+    shot.candelabra(&format!("inspect {SCENE}")).ends(0).says("light group key: 2 lights");
+    shot.candelabra(&format!("inspect {SCENE} --html a.html")).ends(0);
+    let html = String::from_utf8(shot.read("a.html")).unwrap();
+    assert!(html.contains("<td>key</td>") && html.contains("What the scene requires"));
+}
+
 /// The share of the energy that a line of the graph states.
 fn percent(line: &str) -> f64 {
     let before = line.split(" % of").next().unwrap();

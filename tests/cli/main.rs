@@ -4,6 +4,7 @@ mod alone;
 mod build;
 mod diff;
 mod disk;
+mod error;
 mod files;
 mod inspect;
 mod layers;

@@ -44,6 +44,17 @@ fn objects_emit_by_their_material() {
 
 /// What is not there may have been a light, so that notes about it are about lights.
 #[test]
+fn coordinates_that_no_texture_is_looked_up_at_are_not_kept() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("m.mtl"), "newmtl wall\nKd 0.5 0.6 0.7\n").unwrap();
+    for material in ["mtllib m.mtl\nusemtl wall\n", ""] {
+        let obj = format!("{TRIANGLE}{material}f 1/1 2/1 3/1\n");
+        let scene = load_in(folder.path(), &obj).unwrap();
+        assert_eq!((scene.meshes.len(), scene.meshes[0].uv_sets.len()), (1, 0));
+    }
+}
+
+#[test]
 fn stale_references_are_noted() {
     let folder = tempfile::tempdir().unwrap();
     for library in ["absent.mtl", "../outside.mtl", "C:\\models\\a.mtl", "/etc/passwd", "a b.mtl"] {

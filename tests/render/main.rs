@@ -13,6 +13,7 @@ mod forced;
 mod layers;
 mod lens;
 mod moving;
+mod noise;
 mod ranges;
 mod real;
 mod references;

@@ -246,7 +246,7 @@ fn told(noise: &FrameNoise) -> String {
     let FrameNoise { error, bound, decibels, samples, most, capped, spoilt, .. } = *noise;
     let asked = noise.asked.map(|asked| format!("{asked} asked; ")).unwrap_or_default();
     let mut text = format!(
-        "error {asked}{error:.4}, at most {bound:.4} with 95 % certainty ({decibels:.1} dB); \
+        "error {error:.4}, at most {bound:.4} with 95 % certainty ({asked}{decibels:.1} dB); \
          {samples:.0} samples a pixel, {most} at most"
     );
     if capped > 0 {

@@ -119,9 +119,16 @@ fn print_scene(out: &mut impl Write, report: &SceneReport) -> Result<()> {
         "  emitters    {} of {} lights; {} change",
         report.emitters, report.lights, report.changing
     )?;
-    writeln!(out, "  requires")?;
-    for (count, feature) in report.features() {
-        writeln!(out, "    {count:>8}  {feature}")?;
+    writeln!(out, "  {:>10}  {:<31}  {:<8}  {:>12}", "found", "feature", "is", "bytes")?;
+    for feature in &report.features {
+        let (name, state) = (feature.name, feature.state.word());
+        let bytes = feature.bytes.map_or(String::new(), |bytes| bytes.to_string());
+        let note = feature.note.unwrap_or_default();
+        let line = format!("  {:>10}  {name:<31}  {state:<8}  {bytes:>12}  {note}", feature.found);
+        writeln!(out, "{}", line.trim_end())?;
+    }
+    for group in &report.light_groups {
+        writeln!(out, "  light group {}: {}", group.name, counted(group.lights, "light"))?;
     }
     for note in &report.notes {
         writeln!(out, "  note: {note}")?;

@@ -80,6 +80,7 @@ pub(super) fn load(path: &Path) -> Result<Scene, Fault> {
                 look_up(&mut mesh, &scene.materials[number as usize], &object, &mut notes);
             }
             None => {
+                mesh.uv_sets.clear();
                 if let Some(name) = name.filter(|name| !NO_MATERIAL.contains(name)) {
                     // Whether it would emit is not known.
                     let text = "is in no material library; its surfaces have the default material, \
@@ -179,10 +180,15 @@ fn compile(
     Some(mesh)
 }
 
-/// Gives a mesh without texture coordinates, but with textures, one place to look them up.
+/// Gives a mesh without texture coordinates, but with textures, one place to look them up. Coordinates
+/// that no texture is looked up at are not kept.
 fn look_up(mesh: &mut Mesh, material: &Material, object: &str, notes: &mut Notes) {
     let textures = [material.base_color_texture, material.emission_texture];
-    if !mesh.uv_sets.is_empty() || textures.iter().all(Option::is_none) {
+    if textures.iter().all(Option::is_none) {
+        mesh.uv_sets.clear();
+        return;
+    }
+    if !mesh.uv_sets.is_empty() {
         return;
     }
     mesh.uv_sets.push(vec![NO_UV; mesh.positions.len()]);

@@ -2,8 +2,9 @@
 
 mod plan;
 
+use super::features::{Feature, FeatureState};
 use super::report::{LightReport, TreeReport, by_energy, light};
-use super::scene::SceneReport;
+use super::scene::{LightGroupReport, SceneReport};
 use crate::bounds::Aabb;
 use crate::light_tree::LightTree;
 use crate::page::{Cell, Column, Count, Ink, Page, Short, Table};
@@ -21,11 +22,6 @@ pub fn html<D: AsRef<[u8]>>(
 ) -> String {
     let mut page = Page::new(&report.file);
     summary(&mut page, report);
-    if let Some(scene) = scene {
-        page.heading("What the scene requires");
-        page.facts(scene.features().map(|(count, name)| (name, Count(count).to_string())));
-        scene.notes.iter().for_each(|note| page.text(&format!("Note: {note}")));
-    }
     let boxes = light_boxes(tree);
     page.heading("Where the lights are");
     match plan(tree, report, &boxes) {
@@ -34,6 +30,14 @@ pub fn html<D: AsRef<[u8]>>(
     }
     page.heading("Lights");
     page.add(&lights(tree, report, &boxes));
+    if let Some(scene) = scene {
+        page.heading("What the scene requires");
+        page.add(&features(scene));
+        if !scene.light_groups.is_empty() {
+            page.add(&light_groups(scene));
+        }
+        scene.notes.iter().for_each(|note| page.text(&format!("Note: {note}")));
+    }
     page.heading("Trees");
     page.text(
         "Depth: groups on the way to a leaf. Fill: lanes of the groups that are used. Cost: groups that \
@@ -43,6 +47,45 @@ pub fn html<D: AsRef<[u8]>>(
     page.heading("Sections of the file");
     page.add(&sections(report));
     page.finish()
+}
+
+fn features(scene: &SceneReport) -> Table {
+    let row = |feature: &Feature| {
+        let ink = match feature.state {
+            FeatureState::On => Ink::Orange,
+            FeatureState::Off => Ink::Grey,
+            FeatureState::Offered => Ink::Blue,
+        };
+        vec![
+            Cell::Text(feature.name.into()),
+            Cell::count(feature.found),
+            Cell::Key(ink, feature.state.word().into()),
+            feature.bytes.map_or(Cell::Empty, |bytes| Cell::count(bytes as usize)),
+            feature.note.map_or(Cell::Empty, |note| Cell::Text(note.into())),
+        ]
+    };
+    Table {
+        caption: "What is found, and whether it is switched on. Bytes: what it takes there, if that is known."
+            .into(),
+        columns: vec![
+            Column::text("feature"),
+            Column::number("found"),
+            Column::text("is"),
+            Column::number("bytes"),
+            Column::text("why, and at what cost"),
+        ],
+        rows: scene.features.iter().map(row).collect(),
+    }
+}
+
+fn light_groups(scene: &SceneReport) -> Table {
+    let row =
+        |group: &LightGroupReport| vec![Cell::Text(group.name.clone()), Cell::count(group.lights)];
+    Table {
+        caption: "Light groups: a layer each, if asked.".into(),
+        columns: vec![Column::text("light group"), Column::number("lights")],
+        rows: scene.light_groups.iter().map(row).collect(),
+    }
 }
 
 fn summary(page: &mut Page, report: &TreeReport) {

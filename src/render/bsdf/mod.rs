@@ -26,7 +26,7 @@ mod tests;
 
 use crate::light_tree::Lobes;
 use crate::math::color::{Rgb, luminance};
-use crate::math::{Frame, warp};
+use crate::math::{Frame, built_in, warp};
 use albedo::Albedo;
 use glam::{Vec2, Vec3};
 use std::f32::consts::FRAC_1_PI;
@@ -111,6 +111,12 @@ impl Bsdf {
         }
     }
 
+    /// Whether it has a specular lobe. Without one it is Lambertian.
+    fn is_glossy(&self) -> bool {
+        let is_coated = self.dielectric_f90 > 0.0 || self.dielectric_f0 != Rgb::ZERO;
+        built_in::GLOSSY && (is_coated || self.metallic > 0.0)
+    }
+
     /// Towards `wo`.
     pub fn toward(&self, wo: Vec3) -> Reflection {
         let wo = self.frame.to_local(wo);
@@ -124,6 +130,12 @@ impl Bsdf {
             specular_probability: None,
         };
         if wo.z <= 0.0 {
+            return reflection;
+        }
+        if !self.is_glossy() {
+            // Without a look at the albedos: their table costs a process tens of milliseconds.
+            reflection.diffuse = self.diffuse;
+            reflection.specular_probability = (self.diffuse != Rgb::ZERO).then_some(0.0);
             return reflection;
         }
         let whole = 1.0 - self.metallic;
@@ -157,7 +169,7 @@ impl Reflection {
     /// the path then ends without a contribution.
     #[inline]
     pub fn sample(&self, u_lobe: f32, u: Vec2) -> Option<BsdfSample> {
-        let wi = if u_lobe < self.specular_probability? {
+        let wi = if built_in::GLOSSY && u_lobe < self.specular_probability? {
             let h = ggx::sample_normal(self.wo, self.alpha, u);
             (2.0 * self.wo.dot(h) * h - self.wo).normalize()
         } else {
@@ -187,6 +199,9 @@ impl Reflection {
         if self.specular_probability.is_none() {
             return (Rgb::ZERO, Rgb::ZERO);
         }
+        if !built_in::GLOSSY || (self.at_normal, self.toward_grazing) == (Rgb::ZERO, Rgb::ZERO) {
+            return (Rgb::ZERO, self.diffuse / FRAC_1_PI);
+        }
         let part = Albedo::of_ggx(self.wo.z, self.alpha);
         let specular = self.at_normal * (part.a + part.b) + self.toward_grazing * part.b;
         (specular, self.diffuse / FRAC_1_PI)
@@ -200,7 +215,7 @@ impl Reflection {
         };
         let mut value = self.diffuse * cos_i;
         let mut pdf = (1.0 - specular_probability) * warp::cosine_hemisphere_pdf(cos_i);
-        if specular_probability > 0.0 {
+        if built_in::GLOSSY && specular_probability > 0.0 {
             let h = (self.wo + wi).normalize_or(Vec3::Z);
             let schlick = (1.0 - self.wo.dot(h)).clamp(0.0, 1.0).powi(5);
             let shape =

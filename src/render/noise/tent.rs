@@ -12,7 +12,7 @@ const REACH: usize = 4;
 /// # Panics
 /// If the values are not whole rows.
 pub fn around(values: &[f64], width: usize, own: f64) -> Vec<f64> {
-    assert!(width > 0 && values.len() % width == 0, "whole rows");
+    assert!(width > 0 && values.len().is_multiple_of(width), "whole rows");
     // Along a row, without the pixel itself.
     let beside = |row: &[f64], at: usize| -> f64 {
         let from = at.saturating_sub(REACH - 1);

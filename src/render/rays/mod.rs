@@ -76,21 +76,12 @@ struct Placed {
 impl RayScene {
     /// Prepares what does not change in a shot. `pose` may be that of any of its frames.
     pub fn new(scene: &Scene, pose: &Pose) -> RayScene {
-        let moving = scene.moving_nodes();
-        let mut uses = vec![0_usize; scene.meshes.len()];
-        for instance in &scene.instances {
-            uses[instance.mesh as usize] += 1;
-        }
-        let is_shared = |instance: &Instance| {
-            let size = scene.meshes[instance.mesh as usize].triangles.len();
-            let copied = (uses[instance.mesh as usize] - 1) * size;
-            moving[instance.node as usize] || (size > TINY_MESH && copied > COPIED_TRIANGLES)
-        };
+        let is_kept = kept_in_own_space(scene);
         let (mut placed, mut sets, mut flat) = (Vec::new(), HashMap::new(), Vec::new());
         let mut meshes = Vec::new();
         for (number, instance) in scene.instances.iter().enumerate() {
             let number = number as u32;
-            if is_shared(instance) {
+            if is_kept[number as usize] {
                 let set = *sets.entry(instance.mesh).or_insert_with(|| {
                     meshes.push(instance.mesh);
                     meshes.len() as u32 - 1
@@ -120,6 +111,22 @@ impl RayScene {
     pub fn for_pose(&self, scene: &Scene, pose: &Pose) -> Tracer<'_> {
         Tracer::new(self, scene, pose)
     }
+}
+
+/// For each instance, whether rays search its mesh in the mesh's own space: because it moves, or because
+/// copies of it would take much memory.
+pub fn kept_in_own_space(scene: &Scene) -> Vec<bool> {
+    let moving = scene.moving_nodes();
+    let mut uses = vec![0_usize; scene.meshes.len()];
+    for instance in &scene.instances {
+        uses[instance.mesh as usize] += 1;
+    }
+    let is_kept = |instance: &Instance| {
+        let size = scene.meshes[instance.mesh as usize].triangles.len();
+        let copied = (uses[instance.mesh as usize] - 1) * size;
+        moving[instance.node as usize] || (size > TINY_MESH && copied > COPIED_TRIANGLES)
+    };
+    scene.instances.iter().map(is_kept).collect()
 }
 
 /// The place of each instance in the order of paths.

@@ -9,6 +9,7 @@ use super::triangles::{Ray, barycentric};
 use super::wide_bvh::{BoxRay, NONE, WideBvh};
 use super::{Anchor, RayScene, in_world, world_of};
 use crate::bounds::Aabb;
+use crate::math::built_in;
 use crate::scene::{LightKind, Pose, Scene};
 use glam::{DAffine3, DVec3, Vec2, Vec3};
 
@@ -173,6 +174,7 @@ impl<'a> Tracer<'a> {
                         tmax = met(&Meeting { t, on: On::Sphere(sphere) });
                     }
                 }
+                Item::Mesh { .. } if !built_in::INSTANCES => {}
                 Item::Mesh { instance, set, space } => {
                     set.visit::<ORDERED>(&space.localize(ray), tmax, |hit| {
                         tmax = met(&Meeting::with_triangle(&hit.of(*instance), Some(space)));

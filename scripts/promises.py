@@ -1,0 +1,123 @@
+#!/usr/bin/env python3
+"""Measures what `candelabra-render` promises of error and time, and writes the tables of docs/error.md.
+
+    python3 scripts/promises.py target/release SCENE... [--res 96x54] [--depth 1] [--table FILE]
+
+For each scene a converged picture is rendered, in two halves with seeds of their own. Then:
+told over true error at 16, 64 and 256 samples; the true error where 0.1, 0.05 and 0.02 are asked for, and that of
+as many samples in every pixel; seconds used of those that were asked for. The measure is that of
+`src/render/noise`: the root mean square of the difference in the logarithm of luminance plus the grey floor.
+"""
+import argparse
+import json
+import math
+import subprocess
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+import OpenEXR
+
+WEIGHTS = (0.2126, 0.7152, 0.0722)
+SEEDS = 4
+
+
+class Shot:
+    """A scene at a size, rendered by a program."""
+
+    def __init__(self, program, scene, options, folder):
+        self.command = [program, scene, "--float", *options]
+        self.folder = Path(folder)
+
+    def render(self, *options, aov="beauty"):
+        """The luminance, and the events of the last frame."""
+        picture = self.folder / "picture.exr"
+        command = [*self.command, "-o", str(picture), "--progress", "json", "--aov", aov, *map(str, options)]
+        started = time.monotonic()
+        lines = subprocess.run(command, check=True, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL)
+        seconds = time.monotonic() - started
+        events = [json.loads(line) for line in lines.stdout.splitlines() if line.startswith(b"{")]
+        done = next(event for event in events if event["event"] == "frame-done")
+        channels = OpenEXR.File(str(picture), separate_channels=True).channels()
+        light = sum(weight * channels[name].pixels.astype(float) for weight, name in zip(WEIGHTS, "RGB"))
+        return light, done, seconds
+
+
+class Reference:
+    def __init__(self, shot, samples):
+        self.halves = [shot.render("--spp", samples, "--seed", seed)[0] for seed in (7001, 7002)]
+
+    def error(self, light, grey):
+        """The error of a picture, without that of the reference."""
+        a, b = (np.log(half + grey) for half in self.halves)
+        middle = np.log(sum(self.halves) / 2 + grey)
+        squares = (np.log(light + grey) - middle) ** 2 - (a - b) ** 2 / 4
+        noisy = (self.halves[0] != light) | (self.halves[1] != light)
+        return squares[noisy].mean()
+
+
+def root(squares):
+    return math.sqrt(max(0.0, sum(squares) / len(squares)))
+
+
+def measure(shot, samples):
+    reference = Reference(shot, samples)
+    grey = shot.render("--error", 10, "--spp", 8)[1]["noise"]["grey"]
+    rows = {"told": {}, "asked": {}, "grey": grey}
+    for count in (16, 64, 256):
+        told, true = [], []
+        for seed in range(SEEDS):
+            light, done, _ = shot.render("--spp", count, "--grey", grey, "--seed", seed)
+            told.append(done["noise"]["error"] ** 2)
+            true.append(reference.error(light, grey))
+        rows["told"][count] = (root(told), root(true))
+    for asked in (0.1, 0.05, 0.02):
+        true, even, told, counts, seconds, even_seconds = [], [], [], [], [], []
+        for seed in range(SEEDS if asked > 0.04 else 2):
+            light, done, _ = shot.render("--error", asked, "--grey", grey, "--seed", seed)
+            true.append(reference.error(light, grey))
+            told.append(done["noise"]["error"] ** 2)
+            counts.append(done["noise"]["samples"])
+            seconds.append(done["seconds"])
+            light, done, _ = shot.render("--spp", max(2, round(counts[-1])), "--grey", grey, "--seed", 50 + seed)
+            even.append(reference.error(light, grey))
+            even_seconds.append(done["seconds"])
+        mean = lambda values: sum(values) / len(values)
+        rows["asked"][asked] = {
+            "told": root(told), "true": root(true), "even": root(even), "samples": mean(counts),
+            "seconds": mean(seconds), "even_seconds": mean(even_seconds),
+        }
+    return rows
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("programs", type=Path, help="folder of the programs")
+    parser.add_argument("scenes", nargs="+")
+    parser.add_argument("--res", default="96x54")
+    parser.add_argument("--depth", default="1")
+    parser.add_argument("--reference", type=int, default=8192, help="samples of each half of the converged picture")
+    parser.add_argument("--table", type=Path, help="JSON file for the results")
+    options = parser.parse_args()
+    results = {}
+    for scene in options.scenes:
+        with tempfile.TemporaryDirectory() as folder:
+            knobs = ["--res", options.res, "--depth", options.depth]
+            shot = Shot(str(options.programs / "candelabra-render"), scene, knobs, folder)
+            results[Path(scene).stem] = rows = measure(shot, options.reference)
+        for count, (told, true) in rows["told"].items():
+            print(f"{Path(scene).stem:16} {count:4} samples: told {told:.4f}, true {true:.4f}, ratio {told / true:.3f}")
+        for asked, row in rows["asked"].items():
+            print(
+                f"{Path(scene).stem:16} {asked} asked: told {row['told']:.4f}, true {row['true']:.4f}; "
+                f"{row['samples']:.0f} samples a pixel, {row['seconds']:.1f} s; as many everywhere: "
+                f"{row['even']:.4f}, {row['even_seconds']:.1f} s",
+                flush=True,
+            )
+    if options.table:
+        options.table.write_text(json.dumps(results, indent=1))
+
+
+if __name__ == "__main__":
+    main()
