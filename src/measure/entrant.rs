@@ -43,8 +43,6 @@ pub struct Asked {
 )]
 pub struct NoEntrant(String);
 
-/// A pixel has at least one sample.
-const LEAST_SAMPLES: u32 = 1;
 /// Where there are more lights than these, weighing or sampling all of them at every point is not tried
 /// unless it is asked for: it would take most of the time.
 const FEW_LIGHTS: usize = 64;
@@ -117,9 +115,7 @@ impl FromStr for Asked {
 
 fn read(text: &str) -> Option<Asked> {
     let (how, samples) = match text.split_once('@') {
-        Some((how, samples)) => {
-            (how, Some(samples.parse().ok().filter(|&samples| samples >= LEAST_SAMPLES)?))
-        }
+        Some((how, samples)) => (how, Some(samples.parse().ok().filter(|&samples| samples > 0)?)),
         None => (text, None),
     };
     let mut parts = how.split(':');

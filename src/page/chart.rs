@@ -291,15 +291,11 @@ mod tests {
         let places: Vec<[f64; 2]> =
             chart.curves[0].dots.iter().map(|dot| field.at(dot.at)).collect();
         for pair in places.windows(2).collect::<Vec<_>>().windows(2) {
-            for axis in 0..2 {
-                let [one, other] = [0, 1].map(|i| pair[i][1][axis] - pair[i][0][axis]);
-                assert!((one - other).abs() < 1e-9);
-            }
+            let step = |i: usize| [0, 1].map(|axis| pair[i][1][axis] - pair[i][0][axis]);
+            let [one, other] = [step(0), step(1)];
+            assert!(one.iter().zip(other).all(|(one, other)| (one - other).abs() < 1e-9));
         }
-        assert!(
-            places[3][0] > places[0][0] && places[3][1] > places[0][1],
-            "to the right and down"
-        );
+        assert!(places[3][0] > places[0][0] && places[3][1] > places[0][1], "right and down");
     }
 
     #[test]

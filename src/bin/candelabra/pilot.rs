@@ -37,8 +37,7 @@ pub fn run(arguments: &Arguments, display: &Display) -> Result<ShotCost> {
     };
     frames.sort_unstable();
     let emitters = pipeline::collect_emitters::<&[u8]>(&scene, None, &|_, _| {});
-    let mut trees =
-        ShotTrees::built(&scene, &emitters).with_context(|| path.display().to_string())?;
+    let trees = ShotTrees::built(&scene, &emitters).with_context(|| path.display().to_string())?;
     let usual = RenderSettings::default();
     let base = RenderSettings {
         width,
@@ -48,22 +47,13 @@ pub fn run(arguments: &Arguments, display: &Display) -> Result<ShotCost> {
         seed: arguments.seed,
         ..usual
     };
-    let mut delegate = RenderDelegate::new(&scene, &emitters, look.camera, base.clone());
+    let delegate = RenderDelegate::new(&scene, &emitters, look.camera, base.clone());
+    let mut shot = Shot { trees, delegate, base };
     let teller = Teller(display);
-    let mut at =
-        |frame: i32, work: &mut dyn FnMut(&mut Subject<&[u8]>) -> Result<(), RenderError>| {
-            let tree = trees.for_frame(frame)?;
-            let mut subject =
-                Subject { delegate: &mut delegate, tree: &tree, frame, base: base.clone() };
-            work(&mut subject)?;
-            Ok::<(), anyhow::Error>(())
-        };
     let grey = match arguments.grey {
         Some(grey) => grey,
-        None => grey_floor(&pipeline::frames_of(&scene), &mut |frame| {
-            let mut seen = Vec::new();
-            at(frame, &mut |subject| Ok(seen = subject.glimpse(&teller)?))?;
-            Ok(seen)
+        None => grey_floor(&pipeline::frames_of(&scene), |frame| {
+            shot.at(frame, |subject| subject.glimpse(&teller))
         })?,
     };
     let goal = ErrorGoal { error: arguments.error, grey, most: Effort::MOST };
@@ -72,13 +62,32 @@ pub fn run(arguments: &Arguments, display: &Display) -> Result<ShotCost> {
     for (number, &frame) in pilots.iter().enumerate() {
         let done = number as f64 / pilots.len() as f64;
         display.tell(Event::Progress { done, frame: Some(frame) });
-        at(frame, &mut |subject| Ok(costs.push(subject.pilot(goal, &Quiet(&teller))?)))?;
+        costs.push(shot.at(frame, |subject| subject.pilot(goal, &Quiet(&teller)))?);
     }
     Ok(ShotCost::new(goal, costs, &frames))
 }
 
+/// A shot, prepared.
+struct Shot<'a> {
+    trees: ShotTrees<'a>,
+    delegate: RenderDelegate<'a>,
+    base: RenderSettings,
+}
+
+impl Shot<'_> {
+    /// Looks at a frame.
+    fn at<T>(
+        &mut self,
+        frame: i32,
+        look: impl FnOnce(&mut Subject<&[u8]>) -> Result<T, RenderError>,
+    ) -> Result<T> {
+        let (tree, base) = (self.trees.for_frame(frame)?, self.base.clone());
+        Ok(look(&mut Subject { delegate: &mut self.delegate, tree: &tree, frame, base })?)
+    }
+}
+
 /// The grey floor of a shot: of the scene's first, middle and last frame, as a render takes it.
-fn grey_floor(frames: &[i32], glimpse: &mut dyn FnMut(i32) -> Result<Vec<f64>>) -> Result<Grey> {
+fn grey_floor(frames: &[i32], glimpse: impl FnMut(i32) -> Result<Vec<f64>>) -> Result<Grey> {
     let mut seen = [frames[0], frames[frames.len() / 2], frames[frames.len() - 1]].to_vec();
     seen.dedup();
     let pictures: Result<Vec<Vec<f64>>> = seen.into_iter().map(glimpse).collect();
