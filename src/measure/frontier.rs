@@ -21,7 +21,7 @@ pub struct Reach {
     pub samples: u32,
     /// Seconds a picture.
     pub seconds: f64,
-    /// No budget that was measured has so small an error: it is assumed to fall with the root of the samples.
+    /// No budget that was measured has so small an error: it is assumed to fall with the root of the samples, and time to rise with them.
     pub is_beyond: bool,
 }
 
@@ -59,14 +59,7 @@ pub fn reach(points: &[Point], error: f64) -> Option<Reach> {
             (high.seconds - low.seconds) / (high.samples - low.samples),
             false,
         ),
-        None => {
-            let before = last.checked_sub(1).map(|i| points[i]);
-            let even = low.seconds / low.samples;
-            let step = before.map_or(even, |before| {
-                (low.seconds - before.seconds) / (low.samples - before.samples)
-            });
-            (2.0, step, true)
-        }
+        None => (2.0, low.seconds / low.samples, true),
     };
     let samples = (low.samples * (low.error / error).powf(exponent)).ceil();
     let seconds = low.seconds + per_sample.max(0.0) * (samples - low.samples);

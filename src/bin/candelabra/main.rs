@@ -43,7 +43,7 @@ enum Command {
     /// Print what is in a scene or in a tree file, and what the scene requires
     Inspect(inspect::Arguments),
     /// Measure what each way of picking lights trades: error against time, and variance exactly
-    Measure(measure::Arguments),
+    Measure(Box<measure::Arguments>),
     /// Carry out the jobs of a pipeline on this machine
     Run(run::Arguments),
     /// Check that tree files keep every rule of the format, and name the first that is broken
