@@ -5,13 +5,20 @@
 //! variance from where on a light a sample falls is left out, and shadows are left out unless they are
 //! asked for. Contributions have the multiple importance sampling weights that a render gives them, so
 //! the part that is left to reflected rays does not count. The ideal is 0.
+//!
+//! Variances are relative as every error is (see [`noise`](crate::render::noise)): over the square of the light
+//! at the point plus a grey floor, a tenth of the geometric mean of the light at all points. Without a floor the mean over the
+//! points would be that of the few that next to nothing reaches.
 
 use super::contributions::{Contributions, shares};
+use super::entrant::Way;
+use super::reference::middle;
 use crate::light_tree::{LightTree, NoSuchFrame};
 use crate::math::random::{Sampler, hash};
+use crate::render::noise::Grey;
 use crate::render::path::{Integrator, Vertex};
 use crate::render::picker::{LightPicker, PickScratch, Wanted};
-use crate::render::{LightStrategy, RenderDelegate, RenderSettings, Split, SplitBy};
+use crate::render::{LightStrategy, RenderDelegate, RenderSettings};
 use rayon::prelude::*;
 use serde::Serialize;
 use std::time::Instant;
@@ -23,10 +30,10 @@ pub struct ProbeOptions {
     pub probes: u32,
     /// Whether lights that cannot be seen from a point contribute nothing.
     pub visibility: bool,
-    /// Knobs of splitting to measure the tree with; each is measured with both splitting tests.
-    pub knobs: Vec<f32>,
-    /// Lights sampled at a point, at most.
-    pub max_lights: u32,
+    /// Ways to measure.
+    pub ways: Vec<Way>,
+    /// The grey floor, if it is not to follow from the points.
+    pub grey: Option<Grey>,
     /// The seed that chooses the points.
     pub seed: u32,
 }
@@ -38,28 +45,29 @@ pub struct ProbeReport {
     pub probes: usize,
     /// Lights at each: emitters and those at infinity.
     pub lights: usize,
-    /// One row a strategy.
+    /// The grey floor, in the unit of the picture.
+    pub grey: Grey,
+    /// One row a way.
     pub strategies: Vec<StrategyReport>,
 }
 
-/// What one strategy does.
+/// What one way does.
 #[derive(Clone, Debug, Serialize)]
 pub struct StrategyReport {
-    /// Its name.
-    pub strategy: LightStrategy,
-    /// The knob of splitting, if it splits.
-    pub split: Option<f32>,
-    /// The test of splitting, likewise.
-    pub split_by: Option<SplitBy>,
-    /// Variance over squared light, in the mean over all points.
-    pub relative_variance: f64,
-    /// The median over all points.
+    /// What it is called.
+    pub name: String,
+    /// The way.
+    #[serde(flatten)]
+    pub way: Way,
+    /// Relative variance, in the mean over all points: the square of what
+    /// [`error`](Self::error) says.
+    pub variance: f64,
+    /// The error of one estimate: the root of the mean squared error of all points.
+    pub error: f64,
+    /// The median of the relative variance over all points.
     pub median: f64,
     /// Nine points in ten have less.
     pub ninth_decile: f64,
-    /// The mean relative variance times the mean number of lights sampled: the variance of one sample if
-    /// samples were independent and identically distributed.
-    pub variance_times_lights: f64,
     /// Lights sampled at a point, in the mean.
     pub lights: f64,
     /// Most lights expected at any point.
@@ -75,7 +83,7 @@ struct Probe {
     sum: f64,
 }
 
-/// Measures all strategies at points that paths from the delegate's camera visit in a frame.
+/// Measures ways of picking lights at points that paths from the delegate's camera visit in a frame.
 ///
 /// # Errors
 /// If the tree lacks the frame.
@@ -91,33 +99,18 @@ pub fn at_probes(
 fn report(integrator: &Integrator, options: &ProbeOptions) -> ProbeReport {
     let probes: Vec<Probe> =
         (0..options.probes).into_par_iter().filter_map(|i| probe(integrator, i, options)).collect();
-    let mut ways: Vec<(LightStrategy, f32, SplitBy)> = [
-        LightStrategy::Uniform,
-        LightStrategy::Power,
-        LightStrategy::Distance,
-        LightStrategy::Tree,
-    ]
-    .map(|strategy| (strategy, 0.0, SplitBy::Variance))
-    .into();
-    for by in [SplitBy::Variance, SplitBy::SolidAngle] {
-        ways.extend(options.knobs.iter().map(|&knob| (LightStrategy::Tree, knob, by)));
-    }
-    ways.push((LightStrategy::Exhaustive, 0.0, SplitBy::Variance));
-    ways.push((LightStrategy::All, 0.0, SplitBy::Variance));
-    let strategies = ways.into_iter().map(|(strategy, knob, split_by)| {
-        let settings = RenderSettings {
-            strategy,
-            split: Split::Fixed(knob),
-            split_by,
-            max_lights: options.max_lights,
-            ..integrator.settings.clone()
-        };
-        of_strategy(integrator, &settings, &probes)
+    let grey =
+        options.grey.unwrap_or_else(|| Grey::below(middle(probes.iter().map(|probe| probe.sum))));
+    let strategies = options.ways.iter().map(|way| {
+        let Way { strategy, split, split_by } = *way;
+        let settings = RenderSettings { strategy, split, split_by, ..integrator.settings.clone() };
+        of_way(integrator, way, &settings, grey, &probes)
     });
     ProbeReport {
         probes: probes.len(),
         lights: integrator.picker.tree().unforced_count() as usize
             + integrator.infinite.iter().filter(|light| !light.forced).count(),
+        grey,
         strategies: strategies.collect(),
     }
 }
@@ -142,24 +135,24 @@ fn probe(integrator: &Integrator, number: u32, options: &ProbeOptions) -> Option
     (sum > 0.0).then_some(Probe { wanted, contributions, sum })
 }
 
-fn of_strategy(
+fn of_way(
     integrator: &Integrator,
+    way: &Way,
     settings: &RenderSettings,
+    grey: Grey,
     probes: &[Probe],
 ) -> StrategyReport {
     let tree = integrator.picker.tree().clone();
     let picker = LightPicker::new(settings, tree, integrator.infinite);
-    let splitting = settings.splitting(0);
     let rows: Vec<(f64, f64)> = probes
         .par_iter()
         .map(|probe| {
             let (variance, lights) = of_probe(&picker, settings.strategy, probe);
-            (variance / (probe.sum * probe.sum), lights)
+            (grey.of_deviation(variance, probe.sum), lights)
         })
         .collect();
     let mean =
         |of: fn(&(f64, f64)) -> f64| rows.iter().map(of).sum::<f64>() / rows.len().max(1) as f64;
-    let splits = !splitting.is_off();
     let mut sorted: Vec<f64> = rows.iter().map(|row| row.0).collect();
     sorted.sort_unstable_by(f64::total_cmp);
     let quantile = |share: f64| {
@@ -167,13 +160,12 @@ fn of_strategy(
         sorted.get(at.min(sorted.len().saturating_sub(1))).copied().unwrap_or(0.0)
     };
     StrategyReport {
-        strategy: settings.strategy,
-        split: splits.then_some(splitting.knob),
-        split_by: splits.then_some(settings.split_by),
-        relative_variance: mean(|row| row.0),
+        name: way.to_string(),
+        way: *way,
+        variance: mean(|row| row.0),
+        error: mean(|row| row.0).sqrt(),
         median: quantile(0.5),
         ninth_decile: quantile(0.9),
-        variance_times_lights: mean(|row| row.0) * mean(|row| row.1),
         lights: mean(|row| row.1),
         most_lights: rows.iter().map(|row| row.1).fold(0.0, f64::max),
         nanoseconds: nanoseconds(&picker, probes),

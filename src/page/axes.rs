@@ -1,5 +1,7 @@
 //! The scale that the views of a plan share, and the ticks along it.
 
+use super::Short;
+
 /// Round numbers between two others, about `count` of them, and how they are written.
 pub fn ticks(from: f64, to: f64, count: f64) -> Vec<(f64, String)> {
     let step = round_step((to - from) / count);
@@ -13,6 +15,22 @@ pub fn ticks(from: f64, to: f64, count: f64) -> Vec<(f64, String)> {
         .map(|at| (at, label(at, step)))
         .collect()
 }
+
+/// Round numbers along a logarithmic axis between two positive ones: 1, 2 and 5 times the powers of ten, or
+/// these alone if there are many.
+pub fn powers(from: f64, to: f64) -> Vec<(f64, String)> {
+    let decades = from.log10().floor() as i32..=to.log10().ceil() as i32;
+    let few = (to / from).log10() < MOST_DECADES;
+    let steps: &[f64] = if few { &[1.0, 2.0, 5.0] } else { &[1.0] };
+    decades
+        .flat_map(|power| steps.iter().map(move |step| step * 10f64.powi(power)))
+        .filter(|at| (from..=to).contains(at))
+        .map(|at| (at, Short(at).to_string()))
+        .collect()
+}
+
+/// Beyond so many, only the powers of ten are told.
+const MOST_DECADES: f64 = 3.5;
 
 /// 1, 2 or 5 times a power of ten, the first that is not below.
 fn round_step(least: f64) -> f64 {
@@ -48,5 +66,12 @@ mod tests {
             assert!(found.iter().all(|&(at, _)| (from..=to).contains(&at)));
         }
         assert!(ticks(1.0, 1.0, 5.0).is_empty());
+    }
+
+    #[test]
+    fn powers_are_round_and_inside() {
+        let labels = |from, to| powers(from, to).into_iter().map(|tick| tick.1).collect::<Vec<_>>();
+        assert_eq!(labels(0.015, 0.7), ["0.02", "0.05", "0.1", "0.2", "0.5"]);
+        assert_eq!(labels(0.9, 90_000.0), ["1", "10", "100", "1000", "10000"]);
     }
 }

@@ -27,6 +27,11 @@ pub enum Scale {
         /// What is white; positive.
         white: f32,
     },
+    /// From black at 0 through red and yellow to white at this and beyond.
+    Heat {
+        /// What is white; positive.
+        white: f32,
+    },
     /// From blue for a loss through grey for none to orange for a gain.
     Gain {
         /// What is as blue or as orange as can be; positive.
@@ -50,6 +55,11 @@ impl Scale {
         }
         let [r, g, b] = match self {
             Scale::Grey { white } => [255.0 * (value / white).clamp(0.0, 1.0).sqrt(); 3],
+            Scale::Heat { white } => {
+                // One channel after the other, as a body glows.
+                let heat = 3.0 * (value / white).clamp(0.0, 1.0);
+                std::array::from_fn(|i| 255.0 * (heat - i as f32).clamp(0.0, 1.0))
+            }
             Scale::Gain { limit, .. } => {
                 let share = (value / limit).clamp(-1.0, 1.0);
                 let end = if share < 0.0 { LOSS } else { GAIN };
@@ -62,7 +72,7 @@ impl Scale {
     /// The values at both ends of the key.
     fn ends(&self) -> [f32; 2] {
         match *self {
-            Scale::Grey { white } => [0.0, white],
+            Scale::Grey { white } | Scale::Heat { white } => [0.0, white],
             Scale::Gain { limit, .. } => [-limit, limit],
         }
     }
@@ -70,7 +80,7 @@ impl Scale {
     /// What stands at both ends of the key.
     fn words(&self) -> [String; 2] {
         match self {
-            Scale::Grey { white } => ["0".into(), format!("{white:.3}")],
+            Scale::Grey { white } | Scale::Heat { white } => ["0".into(), format!("{white:.3}")],
             Scale::Gain { limit, unit } => [format!("-{limit} {unit}"), format!("+{limit} {unit}")],
         }
     }
@@ -114,5 +124,9 @@ mod tests {
         let grey = Scale::Grey { white: 4.0 };
         let shown = [0.0, 1.0, 4.0, 5.0].map(|value| grey.color(value).0[0]);
         assert_eq!(shown, [0, 128, 255, 255]);
+        let heat = Scale::Heat { white: 3.0 };
+        let shown = [0.0, 1.0, 2.0, 9.0].map(|value| heat.color(value).0);
+        let glow = [[0, 0, 0], [255, 0, 0], [255, 255, 0], [255, 255, 255]];
+        assert!(shown.iter().zip(glow).all(|(rgba, rgb)| rgba[..3] == rgb));
     }
 }

@@ -14,11 +14,14 @@
 //! | `plan` | a [`Plan`]: marks in space, from above and from the front |
 //! | `view`, `axes` | one way of looking at it, and the ticks around it |
 //! | `shade` | marks too many to be drawn, as a ground of density |
+//! | `chart` | a [`Chart`]: curves over logarithmic axes |
 //! | `heat` | a [`HeatMap`]: numbers on a grid as colours |
+//! | `wipe` | a [`Wipe`]: pictures of one thing, two of them under a slider |
 //! | `raster` | pixels as an image inside the page |
 //! | `number` | numbers as people read them |
 
 mod axes;
+mod chart;
 mod escape;
 mod heat;
 mod number;
@@ -28,12 +31,15 @@ mod raster;
 mod shade;
 mod table;
 mod view;
+mod wipe;
 
+pub use chart::{Chart, Curve, Dot};
 pub use heat::{HeatMap, Scale};
 pub use number::{Count, Short, Triple, counted};
 pub use plain::{Lines, Plain, plain_json};
 pub use plan::{Cuboid, Level, Mark, Plan};
 pub use table::{Cell, Column, Table};
+pub use wipe::Wipe;
 
 use escape::Escaped;
 use std::fmt::{self, Display, Write};
@@ -136,7 +142,11 @@ impl Page {
              <script nonce=\"{own}\">\n{script}</script>\n\
              </body>\n\
              </html>\n",
-            style = include_str!("page.css"),
+            style = concat!(
+                include_str!("colors.css"),
+                include_str!("page.css"),
+                include_str!("drawing.css")
+            ),
             body = self.body,
             script = include_str!("page.js"),
         )
@@ -172,6 +182,22 @@ mod tests {
         }];
         plan.levels = vec![Level { name: HOSTILE.into(), boxes: vec![] }];
         page.add(&plan);
+        let dot = Dot { at: [1.0, 1.0], range: None, label: HOSTILE.into(), is_marked: true };
+        page.add(&Chart {
+            caption: HOSTILE.into(),
+            axes: [HOSTILE.into(), HOSTILE.into()],
+            curves: vec![Curve {
+                name: HOSTILE.into(),
+                ink: Ink::Red,
+                is_dashed: true,
+                dots: vec![dot],
+            }],
+            goal: Some((1.0, HOSTILE.into())),
+        });
+        page.add(&Wipe {
+            caption: HOSTILE.into(),
+            pictures: vec![(HOSTILE.into(), image::RgbImage::new(2, 1))],
+        });
         page.add(&HeatMap {
             caption: HOSTILE.into(),
             width: 1,
@@ -180,7 +206,7 @@ mod tests {
         });
         let html = page.finish().replace("<wbr>", "");
         let inert = "/World/&lt;script&gt;alert(&quot;1&quot;)&lt;/script&gt;&#39; onload=&#39;x&amp;amp;\\u{202e}灯\\0";
-        assert!(html.matches(inert).count() >= 12, "{html}");
+        assert!(html.matches(inert).count() >= 20, "{html}");
         assert_eq!(html.matches("<script").count(), 1);
         assert!(!html.contains("onload='") && !html.contains(['\0', '\u{202e}']));
     }

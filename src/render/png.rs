@@ -21,10 +21,7 @@ const MOST_BYTES: u64 = 4 << 30;
 
 /// Writes a preview, all or nothing, with an ASCII text in it.
 pub fn write_png(path: &Path, picture: &Beauty, exposure_stops: f32, text: &str) -> io::Result<()> {
-    let scale = exposure_stops.exp2();
-    let encode = |linear: f32| (linear_to_srgb(film(linear * scale)) * 255.0 + 0.5) as u8;
-    let pixels: Vec<u8> =
-        picture.pixels.iter().flat_map(|color| color.to_array().map(encode)).collect();
+    let pixels = shown(picture, exposure_stops);
     write_atomically(path, |file| {
         let mut encoder = Encoder::new(file, picture.width, picture.height);
         encoder.set_color(ColorType::Rgb);
@@ -34,6 +31,13 @@ pub fn write_png(path: &Path, picture: &Beauty, exposure_stops: f32, text: &str)
         writer.write_image_data(&pixels).map_err(into_io)?;
         writer.finish().map_err(into_io)
     })
+}
+
+/// The bytes of a preview's pixels: red, green and blue, row after row.
+pub fn shown(picture: &Beauty, exposure_stops: f32) -> Vec<u8> {
+    let scale = exposure_stops.exp2();
+    let encode = |linear: f32| (linear_to_srgb(film(linear * scale)) * 255.0 + 0.5) as u8;
+    picture.pixels.iter().flat_map(|color| color.to_array().map(encode)).collect()
 }
 
 /// Keeps the kind of an error: a full disk has a remedy.

@@ -10,6 +10,7 @@ mod inspect;
 mod layers;
 mod lies;
 mod lights;
+mod measure;
 mod names;
 mod notes;
 mod pages;

@@ -113,11 +113,12 @@ fn every_chunk_of_a_shot_has_the_same_view() {
 }
 
 #[test]
-fn measure_race_and_diff_take_the_same_options() {
+fn measure_and_diff_take_the_same_options() {
     let shot = blind();
-    let measure = format!("measure {SCENE} --probes 8 --json");
-    let race = format!("race {SCENE} tree@1 --res 8x6 --pictures 2 --json");
-    for command in [&measure, &race] {
+    let measure = format!("measure {SCENE} --exact --probes 8 --json -");
+    let pictures = format!("measure {SCENE} tree@2 --res 8x6 --seeds 1 --cache cache --json -");
+    let pilot = format!("measure {SCENE} --shot --res 8x6 --error 1 --json -");
+    for command in [&measure, &pictures, &pilot] {
         shot.candelabra(command).ends(0).complains(&[NOTE]);
         for view in ["--camera eye.gltf", "--look-from 0,0,4 --look-at 0,0,0 --fov 50", "--fit"] {
             shot.candelabra(&format!("{command} {view}")).ends(0);
@@ -129,12 +130,12 @@ fn measure_race_and_diff_take_the_same_options() {
         shot.candelabra(&format!("{command} --camera /eye")).ends(1).complains(&["no camera"]);
     }
     shot.candelabra(&format!("{measure} --split 0.1,nan")).ends(2);
-    shot.candelabra(&format!("race {SCENE} tree:nan@1")).ends(2).complains(&["from 0 to 1"]);
+    shot.candelabra(&format!("measure {SCENE} tree:nan@2")).ends(2).complains(&["from 0 to 1"]);
     // What is measured is what is seen.
     let variance = |view: &str| {
         let told = shot.candelabra(&format!("{measure} {view}")).ends(0);
         let report: Value = serde_json::from_str(&told.out).unwrap();
-        report["strategies"][0]["relative_variance"].as_f64().unwrap()
+        report["exact"]["strategies"][0]["variance"].as_f64().unwrap()
     };
     assert_eq!(variance("--camera eye.gltf"), variance("--camera eye.gltf:/eye"));
     assert_ne!(variance("--camera eye.gltf"), variance("--look-from 3,0,1"));

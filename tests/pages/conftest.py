@@ -105,6 +105,14 @@ def diff_page(candelabra, scenes, folder) -> Path:
 
 
 @pytest.fixture(scope="session")
+def measure_page(candelabra, scenes, folder) -> Path:
+    page = folder / "measure.html"
+    small = ["--res", "48x32", "--seeds", "2", "--probes", "16", "--cache", folder / "cache"]
+    candelabra("measure", scenes[0], "uniform", "tree:0", "tree", "--budgets", "2,4,8", *small, "--html", page)
+    return page
+
+
+@pytest.fixture(scope="session")
 def browser():
     """A browser; `CANDELABRA_BROWSER` names one. Without any the tests are skipped, but not under CI."""
     named = os.environ.get("CANDELABRA_BROWSER")

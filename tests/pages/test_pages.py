@@ -1,4 +1,4 @@
-"""The pages of `inspect` and `diff`, in a real browser."""
+"""The pages of `inspect`, `diff` and `measure`, in a real browser."""
 
 import io
 
@@ -6,7 +6,7 @@ import pytest
 from conftest import HOSTILE
 from PIL import Image
 
-PAGES = ["inspect_page", "diff_page"]
+PAGES = ["inspect_page", "diff_page", "measure_page"]
 COLUMN = "[...document.querySelector('table').tBodies[0].rows].map(row => row.cells[%d].%s)"
 """What stands in a column of the first table."""
 
@@ -35,8 +35,9 @@ def test_it_loads_without_complaint_and_asks_for_nothing(browser, page):
     assert [url for url in urls if not url.startswith("data:")] == [page.resolve().as_uri()]
 
 
-def test_hostile_names_are_inert(browser, page):
-    browser.open(page)
+@pytest.mark.parametrize("name", ["inspect_page", "diff_page"])
+def test_hostile_names_are_inert(browser, request, name):
+    browser.open(request.getfixturevalue(name))
     assert HOSTILE in browser.run("document.querySelector('table').textContent")
     assert browser.run("document.scripts.length") == 1
     assert browser.run("document.querySelectorAll('[onerror], [src=x]').length") == 0
@@ -131,3 +132,75 @@ def test_dark_is_dark_and_light_is_light(browser, page):
 
     assert ground(False) > 200
     assert ground(True) < 60
+
+
+def move(browser, x: float, y: float, what: str = "mouseMoved", **more) -> None:
+    browser.call("Input.dispatchMouseEvent", type=what, x=x, y=y, **more)
+
+
+def test_who_points_near_a_dot_of_the_curves_is_told_its_values(browser, measure_page):
+    browser.open(measure_page)
+    browser.run("document.querySelector('.chart').scrollIntoView({block: 'center'})")
+    assert browser.run("document.querySelectorAll('.chart path.curve').length") == 2 * 3
+    places = browser.run(
+        "[...document.querySelectorAll('.chart circle')].map(dot => {"
+        " const {x, y, width, height} = dot.getBoundingClientRect();"
+        " return [x + width / 2, y + height / 2, dot.querySelector('title').textContent]; })"
+    )
+    assert len(places) == 9
+    for x, y, label in (places[0], places[4], places[8]):
+        move(browser, x + 1, y - 1)
+        assert browser.run("document.querySelector('.chart output').textContent") == label
+        assert "error" in label and " s," in label and "dB" in label
+    assert browser.run("document.querySelectorAll('.chart circle.near').length") == 1
+    # Some dot is on the frontier; the broad line goes through all of them.
+    marked = browser.run("document.querySelectorAll('.chart circle.marked').length")
+    through = browser.run("document.querySelector('.chart .frontier').getAttribute('d').match(/[ML]/g).length")
+    assert 0 < marked == through
+
+
+def test_curves_fall_and_stay_inside_their_frame(browser, measure_page):
+    browser.open(measure_page)
+    inside = """(() => {
+        const box = (e) => e.getBoundingClientRect();
+        const frame = box(document.querySelector('.chart .frame'));
+        return [...document.querySelectorAll('.chart circle')].every((dot) => {
+            const { left, right, top, bottom } = box(dot);
+            return left >= frame.left && right <= frame.right && top >= frame.top && bottom <= frame.bottom;
+        });
+    })()"""
+    assert browser.run(inside)
+    names = browser.run("[...document.querySelectorAll('.chart .name')].map(name => name.textContent)")
+    assert sorted(names) == ["tree:0", "tree:0.5", "uniform"]
+
+
+def test_a_slider_shows_more_of_one_picture_or_of_the_other(browser, measure_page):
+    browser.open(measure_page)
+    browser.run("document.querySelector('.wipe .stage').scrollIntoView({block: 'center'})")
+    x, y, width, height = browser.run(
+        "(({x, y, width, height}) => [x, y, width, height])"
+        "(document.querySelector('.wipe .stage').getBoundingClientRect())"
+    )
+    assert width > 300 and 0.5 < height / width < 0.8, "the picture has its shape"
+    clip = "document.querySelectorAll('.wipe .stage img')[1].style.clipPath"
+    for share in (0.25, 0.75):
+        place = {"x": x + share * width, "y": y + 10}
+        move(browser, **place, what="mousePressed", button="left", buttons=1, clickCount=1)
+        move(browser, **place, what="mouseReleased", button="left", clickCount=1)
+        shown = float(browser.run(clip).split()[-1].rstrip("%)"))
+        assert abs(shown - 100 * share) < 1, browser.run(clip)
+    # The left picture, the right one, and all that can be chosen.
+    sources = "[...document.querySelectorAll('.wipe .stage img')].map(image => image.src)"
+    left, right = browser.run(sources)
+    assert left != right
+    chosen = "[...document.querySelectorAll('.wipe select')].map(select => select.selectedOptions[0].text)"
+    assert browser.run(chosen)[1] == "the reference"
+    browser.run("(s => { s.value = 1; s.dispatchEvent(new Event('input')); })(document.querySelectorAll('.wipe select')[1])")
+    assert browser.run(chosen)[1].split("@")[0] in ("tree:0", "tree:0.5", "uniform")
+    assert browser.run(sources)[0] == left and browser.run(sources)[1] not in (left, right)
+
+
+def test_maps_of_error_are_not_all_alike(browser, measure_page):
+    browser.open(measure_page)
+    sources = browser.run("[...document.querySelectorAll('.heat > img')].map(image => image.src)")
+    assert len(set(sources)) == 3

@@ -9,8 +9,9 @@ mod farm;
 mod inspect;
 mod lost_pages;
 mod measure;
+mod measure_table;
 mod page;
-mod race;
+mod pilot;
 mod run;
 mod run_display;
 mod shot;
@@ -41,10 +42,8 @@ enum Command {
     Farm(farm::Arguments),
     /// Print what is in a scene or in a tree file, and what the scene requires
     Inspect(inspect::Arguments),
-    /// Compute exactly how far off each strategy of picking lights is, at points of a picture
-    Measure(measure::Arguments),
-    /// Render with several settings and compare their errors and times
-    Race(race::Arguments),
+    /// Measure what each way of picking lights trades: error against time, and variance exactly
+    Measure(Box<measure::Arguments>),
     /// Carry out the jobs of a pipeline on this machine
     Run(run::Arguments),
     /// Check that tree files keep every rule of the format, and name the first that is broken
@@ -77,8 +76,7 @@ fn main() -> ExitCode {
         Command::Diff(arguments) => diff::run(arguments),
         Command::Farm(arguments) => farm::run(arguments).map(done),
         Command::Inspect(arguments) => inspect::run(arguments).map(done),
-        Command::Measure(arguments) => measure::run(arguments).map(done),
-        Command::Race(arguments) => race::run(arguments).map(done),
+        Command::Measure(arguments) => measure::run(arguments),
         Command::Run(arguments) => run::run(arguments),
         Command::Verify(arguments) => verify::run(arguments),
     };

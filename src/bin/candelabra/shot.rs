@@ -8,7 +8,7 @@ use candelabra::pipeline::{self, Look, View};
 use candelabra::scene::{Camera, Scene};
 use candelabra::store::AlignedBytes;
 use clap::Args;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 #[derive(Args)]
 #[group(skip)]
@@ -20,6 +20,18 @@ pub struct Arguments {
     frame: Option<i32>,
     #[command(flatten)]
     view: View,
+}
+
+impl Arguments {
+    /// The file of the scene.
+    pub fn scene(&self) -> &Path {
+        &self.scene
+    }
+
+    /// What to look at it through.
+    pub fn view(&self) -> &View {
+        &self.view
+    }
 }
 
 /// A scene with the tree of one frame.

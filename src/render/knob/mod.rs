@@ -23,6 +23,7 @@ pub use pilot::pilot;
 pub(super) use trial::Trial;
 
 use serde::{Deserialize, Serialize};
+use std::fmt;
 
 /// How readily clusters are split.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -35,6 +36,23 @@ pub enum Split {
     Fixed(f32),
     /// By one knob for each kind of point.
     ByBounce(Knobs),
+}
+
+impl From<f32> for Split {
+    fn from(knob: f32) -> Split {
+        Split::Fixed(knob)
+    }
+}
+
+/// As it is written on a command line: `auto`, or a knob; several are joined by `/`.
+impl fmt::Display for Split {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Split::Auto => f.write_str("auto"),
+            Split::Fixed(knob) => write!(f, "{knob}"),
+            Split::ByBounce(Knobs { by_bounce: [a, b, c] }) => write!(f, "{a}/{b}/{c}"),
+        }
+    }
 }
 
 impl Split {
