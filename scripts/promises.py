@@ -20,7 +20,6 @@ import numpy as np
 import OpenEXR
 
 WEIGHTS = (0.2126, 0.7152, 0.0722)
-SEEDS = 4
 
 
 class Shot:
@@ -61,20 +60,20 @@ def root(squares):
     return math.sqrt(max(0.0, sum(squares) / len(squares)))
 
 
-def measure(shot, samples):
+def measure(shot, samples, seeds, errors):
     reference = Reference(shot, samples)
     grey = shot.render("--error", 10, "--spp", 8)[1]["noise"]["grey"]
     rows = {"told": {}, "asked": {}, "grey": grey}
     for count in (16, 64, 256):
         told, true = [], []
-        for seed in range(SEEDS):
+        for seed in range(seeds):
             light, done, _ = shot.render("--spp", count, "--grey", grey, "--seed", seed)
             told.append(done["noise"]["error"] ** 2)
             true.append(reference.error(light, grey))
         rows["told"][count] = (root(told), root(true))
-    for asked in (0.1, 0.05, 0.02):
+    for asked in errors:
         true, even, told, counts, seconds, even_seconds = [], [], [], [], [], []
-        for seed in range(SEEDS if asked > 0.04 else 2):
+        for seed in range(seeds if asked > 0.04 else 1):
             light, done, _ = shot.render("--error", asked, "--grey", grey, "--seed", seed)
             true.append(reference.error(light, grey))
             told.append(done["noise"]["error"] ** 2)
@@ -98,6 +97,8 @@ def main():
     parser.add_argument("--res", default="96x54")
     parser.add_argument("--depth", default="1")
     parser.add_argument("--reference", type=int, default=8192, help="samples of each half of the converged picture")
+    parser.add_argument("--seeds", type=int, default=4, help="pictures of each kind")
+    parser.add_argument("--errors", type=float, nargs="+", default=[0.1, 0.05, 0.02])
     parser.add_argument("--table", type=Path, help="JSON file for the results")
     options = parser.parse_args()
     results = {}
@@ -105,7 +106,9 @@ def main():
         with tempfile.TemporaryDirectory() as folder:
             knobs = ["--res", options.res, "--depth", options.depth]
             shot = Shot(str(options.programs / "candelabra-render"), scene, knobs, folder)
-            results[Path(scene).stem] = rows = measure(shot, options.reference)
+            results[Path(scene).stem] = rows = measure(
+                shot, options.reference, options.seeds, options.errors
+            )
         for count, (told, true) in rows["told"].items():
             print(f"{Path(scene).stem:16} {count:4} samples: told {told:.4f}, true {true:.4f}, ratio {told / true:.3f}")
         for asked, row in rows["asked"].items():

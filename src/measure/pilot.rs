@@ -6,7 +6,6 @@
 //! the noise of well stratified samples falls faster than is assumed, and broad pixels have more to average.
 
 use super::picture::Subject;
-use super::reference::middle;
 use super::trade::{Account, Onlooker};
 use crate::math::color::luminance;
 use crate::render::noise::Grey;
@@ -114,7 +113,7 @@ impl<D: AsRef<[u8]>> Subject<'_, '_, D> {
 
 /// The grey floor of a shot, from the luminances of some of its frames.
 pub fn grey_of(frames: &[Vec<f64>]) -> Grey {
-    Grey::below(middle(frames.iter().flatten().copied()))
+    Grey::of(frames.iter().flatten().copied())
 }
 
 impl ShotCost {

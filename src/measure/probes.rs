@@ -12,7 +12,6 @@
 
 use super::contributions::{Contributions, shares};
 use super::entrant::Way;
-use super::reference::middle;
 use crate::light_tree::{LightTree, NoSuchFrame};
 use crate::math::random::{Sampler, hash};
 use crate::render::noise::Grey;
@@ -99,8 +98,7 @@ pub fn at_probes(
 fn report(integrator: &Integrator, options: &ProbeOptions) -> ProbeReport {
     let probes: Vec<Probe> =
         (0..options.probes).into_par_iter().filter_map(|i| probe(integrator, i, options)).collect();
-    let grey =
-        options.grey.unwrap_or_else(|| Grey::below(middle(probes.iter().map(|probe| probe.sum))));
+    let grey = options.grey.unwrap_or_else(|| Grey::of(probes.iter().map(|probe| probe.sum)));
     let strategies = options.ways.iter().map(|way| {
         let Way { strategy, split, split_by } = *way;
         let settings = RenderSettings { strategy, split, split_by, ..integrator.settings.clone() };

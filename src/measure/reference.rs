@@ -31,7 +31,7 @@ impl Converged {
             width: width as usize,
             halves: a.into_iter().zip(b).map(Into::into).collect(),
         };
-        let grey = grey.unwrap_or_else(|| Grey::below(middle(reference.luminance())));
+        let grey = grey.unwrap_or_else(|| Grey::of(reference.luminance()));
         let noisy: Vec<f64> = reference
             .halves
             .iter()
@@ -42,15 +42,6 @@ impl Converged {
         let error = (noisy.iter().sum::<f64>() / noisy.len().max(1) as f64).sqrt();
         Converged { reference, beauty: Beauty { width, height, pixels }, grey, error }
     }
-}
-
-/// The middle of some luminances, as a shot's grey floor follows from it: the geometric mean of those that
-/// are lit, 0 if none is.
-pub fn middle(luminances: impl Iterator<Item = f64>) -> f64 {
-    let lit = luminances.filter(|light| *light > 0.0 && light.is_finite());
-    let (sum, count) =
-        lit.fold((0.0, 0.0), |(sum, count), light| (sum + light.log2(), count + 1.0));
-    if count > 0.0 { f64::exp2(sum / count) } else { 0.0 }
 }
 
 #[cfg(test)]
@@ -69,6 +60,5 @@ mod tests {
         assert!((converged.error - 0.025).abs() < 1e-4, "{}", converged.error);
         let floor = Converged::of(&[half(3.0), half(1.0)], None).grey;
         assert!((floor.luminance() - 0.1 * 2.0_f64.sqrt()).abs() < 1e-6);
-        assert_eq!(middle([0.0, f64::NAN].into_iter()), 0.0);
     }
 }

@@ -21,8 +21,8 @@ const SAMPLES: u32 = 8;
 pub(super) struct Glimpse {
     /// Stops that bring its middle to middle grey.
     pub exposure: f32,
-    /// Sum of the logarithms of the luminance of its lit pixels, to base 2, and how many they are.
-    pub lit: (f64, f64),
+    /// Of its pixels.
+    pub luminances: Vec<f64>,
 }
 
 /// Looks at a frame.
@@ -50,18 +50,8 @@ pub(super) fn glimpse(
     let rendered = delegate.render(tree, frame, &Patience(watch));
     delegate.set_settings(shot.settings.clone());
     let picture = Beauty::of(&rendered?.buffers, true);
-    let lights = picture.pixels.iter().map(|&color| f64::from(luminance(color)));
-    let lit = lights
-        .filter(|light| *light > 0.0 && light.is_finite())
-        .fold((0.0, 0.0), |(sum, count), light| (sum + light.log2(), count + 1.0));
-    Ok(Glimpse { exposure: exposure_for(&picture), lit })
-}
-
-/// The middle luminance of some pictures: the geometric mean over all that is lit, 0 if nothing is.
-pub(super) fn middle<'a>(glimpses: impl Iterator<Item = &'a Glimpse>) -> f64 {
-    let add = |(sum, count), glimpse: &Glimpse| (sum + glimpse.lit.0, count + glimpse.lit.1);
-    let (sum, count) = glimpses.fold((0.0, 0.0), add);
-    if count > 0.0 { f64::exp2(sum / count) } else { 0.0 }
+    let luminances = picture.pixels.iter().map(|&color| f64::from(luminance(color))).collect();
+    Ok(Glimpse { exposure: exposure_for(&picture), luminances })
 }
 
 /// Tells nothing, and hears when to stop.

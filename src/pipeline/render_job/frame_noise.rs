@@ -94,7 +94,7 @@ pub(super) fn audit(
     let mut counts = vec![0; film.taken().len()];
     for number in 0..pixels {
         let at = u64::from(hash(hash(settings.seed, frame as u32), !number));
-        let at = (at * counts.len() as u64 >> 32) as usize;
+        let at = ((at * counts.len() as u64) >> 32) as usize;
         counts[at] = film.taken()[at].saturating_mul(MORE);
     }
     let seed = hash(settings.seed, u32::MAX);

@@ -1,6 +1,6 @@
 //! Frame after frame.
 
-use super::ahead::{Glimpse, glimpse, middle};
+use super::ahead::{Glimpse, glimpse};
 use super::checkpoint::Checkpoint;
 use super::clock::{Clock, Deadline};
 use super::control::FrameControl;
@@ -238,7 +238,7 @@ impl<'a> Pass<'a> {
             self.glimpse(frame)?;
         }
         let glimpses = seen.iter().filter_map(|frame| self.glimpses.get(frame));
-        Ok(Some(Grey::below(middle(glimpses))))
+        Ok(Some(Grey::of(glimpses.flat_map(|glimpse| glimpse.luminances.iter().copied()))))
     }
 
     /// The settings, with the knobs of splitting that are best for the shot: by a pilot in the scene's first

@@ -133,7 +133,7 @@ impl Bsdf {
             return reflection;
         }
         if !self.is_glossy() {
-            // Without a look at the albedos: their table costs a process tens of milliseconds.
+            // Without a look at the albedos: their table takes a process 100 million instructions.
             reflection.diffuse = self.diffuse;
             reflection.specular_probability = (self.diffuse != Rgb::ZERO).then_some(0.0);
             return reflection;

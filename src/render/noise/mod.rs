@@ -43,6 +43,14 @@ impl Grey {
     /// The floor that is this share of a shot's middle luminance, unless another one is asked for.
     pub const SHARE: f64 = 0.1;
 
+    /// The floor of pictures with these luminances: a tenth of the geometric mean of what is lit.
+    pub fn of(luminances: impl Iterator<Item = f64>) -> Grey {
+        let lit = luminances.filter(|light| *light > 0.0 && light.is_finite());
+        let (sum, count) =
+            lit.fold((0.0, 0.0), |(sum, count), light| (sum + light.log2(), count + 1.0));
+        Grey::below(if count > 0.0 { f64::exp2(sum / count) } else { 0.0 })
+    }
+
     /// A floor; positive and finite, or `None`.
     pub fn new(luminance: f64) -> Option<Grey> {
         (luminance > 0.0 && luminance.is_finite()).then_some(Grey(luminance))
@@ -87,12 +95,54 @@ pub fn pool(values: &[f64], width: usize) -> Vec<f64> {
     sums.iter().zip(weights).map(|(sum, weight)| sum / weight).collect()
 }
 
-/// An error in stops.
-pub fn stops(error: f64) -> f64 {
-    error / std::f64::consts::LN_2
-}
-
 /// An error as a ratio of light to noise in decibels: 20 for 0.1, 40 for 0.01.
 pub fn decibels(error: f64) -> f64 {
     -20.0 * error.log10()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        /// Over many decades: small errors are deviations over light and floor; the unit does not show; order
+        /// does not matter; and no error is larger than its deviation over the floor.
+        #[test]
+        fn the_error_is_relative_in_the_light_and_absolute_in_the_dark(
+            log_grey in -30.0..30.0f64,
+            log_light in -6.0..6.0f64,
+            log_off in -8.0..3.0f64,
+        ) {
+            let grey = Grey::new(10f64.powf(log_grey)).unwrap();
+            let light = grey.luminance() * 10f64.powf(log_light);
+            let scale = light + grey.luminance();
+            let off = 10f64.powf(log_off) * scale;
+            let error = grey.squared_error(light + off, light).sqrt();
+            if log_off < -3.0 {
+                let deviation = grey.of_deviation(off * off, light).sqrt();
+                prop_assert!((error / deviation - 1.0).abs() < 2e-3, "{error} {deviation}");
+            }
+            let back = grey.squared_error(light, light + off).sqrt();
+            prop_assert!((back / error - 1.0).abs() < 1e-6, "{error} {back}");
+            let unit = Grey::new(1.0).unwrap();
+            let scaled = unit.squared_error((light + off) / grey.luminance(), light / grey.luminance());
+            prop_assert!((scaled.sqrt() / error - 1.0).abs() < 1e-4, "{error} {scaled}");
+            prop_assert!(error <= off / grey.luminance() * 1.000_001);
+        }
+    }
+
+    #[test]
+    fn the_floor_of_pictures_without_light_is_the_smallest_there_is() {
+        let floor = Grey::of([0.0, f64::NAN, f64::INFINITY].into_iter());
+        assert_eq!(floor.luminance(), f64::MIN_POSITIVE);
+        assert_eq!(floor.squared_error(0.0, 0.0), 0.0);
+        assert!((Grey::of([0.0, 1.0, 100.0].into_iter()).luminance() - 1.0).abs() < 1e-9);
+        assert_eq!([Grey::new(0.0), Grey::new(f64::NAN), Grey::new(-1.0)], [None; 3]);
+    }
+
+    #[test]
+    fn an_error_of_a_hundredth_is_forty_decibels() {
+        assert!((decibels(0.01) - 40.0).abs() < 1e-9);
+    }
 }
