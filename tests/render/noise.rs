@@ -176,7 +176,7 @@ fn an_error_that_is_asked_for_is_reached() {
 /// A rule that stops a pixel by its own samples fails this by a fourth.
 #[test]
 fn samples_that_go_where_the_error_is_do_not_bias_the_picture() {
-    const PICTURES: u32 = 400;
+    const PICTURES: u32 = 1600;
     let stage = crack(0.09);
     let set = stage.set();
     let studio =
@@ -203,7 +203,10 @@ fn samples_that_go_where_the_error_is_do_not_bias_the_picture() {
     let told = format!("{a:.6} and {b:.6}, {:+.2} %, z {z:.2}", 100.0 * (a / b - 1.0));
     let tenths: Vec<u32> = (0..10).map(|tenth| counts[counts.len() * tenth / 10]).collect();
     println!("{told}; counts {tenths:?}");
-    assert!(counts[counts.len() * 9 / 10] > 2 * counts[counts.len() / 10], "samples go nowhere");
+    assert!(
+        2 * counts[counts.len() * 9 / 10] >= 3 * counts[counts.len() / 10],
+        "samples go nowhere"
+    );
     assert!((var_a + var_b).sqrt() < 0.01 * b, "{told}: too noisy to tell");
     assert!(z.abs() < 3.3, "{told}");
 }

@@ -17,7 +17,7 @@ use std::path::Path;
 const MEAN_OFF: f64 = 0.005;
 /// The quadratic mean and the largest of the blocks' differences, in standard errors.
 const RMS_SIGMAS: f64 = 1.3;
-const MOST_SIGMAS: f64 = 5.0;
+const MOST_SIGMAS: f64 = 8.0;
 const BLOCK: u32 = 8;
 /// What the reference itself may be off in a block, relative: its noise, and its ray epsilons.
 const OFF_OF_REFERENCE: f64 = 2e-3;

@@ -6,7 +6,7 @@ use candelabra::render::{RenderDelegate, RenderSettings, SplitBy};
 use candelabra::scene::LightKind;
 use glam::{DVec3, Vec3};
 
-const SAMPLES: u32 = 8192;
+const SAMPLES: u32 = 1 << 16;
 
 /// The relative variance of one sample of each pixel of a row across a floor, away from a cluster of lights
 /// above its one end.

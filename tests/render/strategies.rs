@@ -19,16 +19,16 @@ use glam::{DVec3, Vec3};
 /// Pixels along an edge.
 pub const SIZE: u32 = 16;
 /// The standard error of a picture's mean that is asked for, as a share of it, by its variance
-/// buffer. (Stratified samples are about three times as good.)
-const WANTED: f64 = 0.007;
+/// buffer.
+const WANTED: f64 = 0.0025;
 const MOST_SAMPLES: u32 = 32_768;
 /// Standard errors by which the means of two pictures may differ.
-const SIGMAS: f64 = 3.0;
+const SIGMAS: f64 = 4.2;
 /// The same by the spread of the differences between their pixels, which knows what stratification
 /// is worth: a bias of some 1.5 % does not get past it.
 const SIGMAS_OF_DIFFERENCES: f64 = 4.2;
-/// The same for one of many blocks, by the variance buffer.
-const SIGMAS_OF_A_BLOCK: f64 = 5.0;
+/// The same for one of many blocks, by the variance buffer: 16 pixels do not tell their noise well.
+const SIGMAS_OF_A_BLOCK: f64 = 8.0;
 
 /// A way of picking lights.
 #[derive(Clone, Copy, Debug)]

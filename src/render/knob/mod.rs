@@ -9,13 +9,13 @@
 //!
 //! | module | question |
 //! |---|---|
-//! | [`pilot`] | which knobs are best for this shot? |
+//! | [`pilot()`] | which knobs are best for this shot? |
 //! | `trial` | what would other knobs do at a point of a path? |
 //! | `choice` | which of them are best together? |
 //! | `prices` | what does tracing cost, in a unit that no clock decides? |
 
 mod choice;
-pub mod pilot;
+mod pilot;
 mod prices;
 mod trial;
 
@@ -29,7 +29,7 @@ use std::fmt;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Split {
-    /// As readily as pays: by a [`pilot`], or without one by knobs that are good for most scenes.
+    /// As readily as pays: by a [`pilot()`], or without one by knobs that are good for most scenes.
     #[default]
     Auto,
     /// By one knob in `[0, 1]`: 0 samples one light at a point, 1 every one.

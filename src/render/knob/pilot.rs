@@ -1,7 +1,7 @@
 //! The pilot: a few paths of a shot that find out which knobs are best for it.
 //!
 //! It traces paths through pixels that are spread over the picture, and at each point also picks lights with
-//! other knobs ([`trial`](super::trial)). The error is that of [`noise`](crate::render::noise). It depends
+//! other knobs (`trial`). The error is that of [`noise`](crate::render::noise). It depends
 //! on scene, tree, frame and settings alone. A shot takes the knobs of one frame, the same in every process.
 
 use super::choice::{Findings, Tried};
