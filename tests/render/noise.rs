@@ -176,7 +176,7 @@ fn an_error_that_is_asked_for_is_reached() {
 /// A rule that stops a pixel by its own samples fails this by a fourth.
 #[test]
 fn samples_that_go_where_the_error_is_do_not_bias_the_picture() {
-    const PICTURES: u32 = 1600;
+    const PICTURES: u32 = 400;
     let stage = crack(0.09);
     let set = stage.set();
     let studio =

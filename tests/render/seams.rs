@@ -6,7 +6,7 @@ use candelabra::render::{RenderDelegate, RenderSettings, SplitBy};
 use candelabra::scene::LightKind;
 use glam::{DVec3, Vec3};
 
-const SAMPLES: u32 = 1 << 16;
+const SAMPLES: u32 = 1 << 13;
 
 /// The relative variance of one sample of each pixel of a row across a floor, away from a cluster of lights
 /// above its one end.
@@ -55,7 +55,7 @@ fn largest_jump(profile: &[f64]) -> f64 {
 #[test]
 fn variance_changes_smoothly_where_the_seed_has_seams() {
     let most = u32::MAX;
-    let hard = profile(Way { split_by: SplitBy::SolidAngle, most, ..Way::split(0.8) });
+    let hard = profile(Way { split_by: SplitBy::SolidAngle, most, ..Way::split(0.99) });
     let graded = profile(Way { most, ..Way::split(0.1) });
     let print = |name: &str, profile: &[f64]| {
         let row: Vec<String> = profile.iter().step_by(3).map(|v| format!("{v:.4}")).collect();
@@ -63,6 +63,7 @@ fn variance_changes_smoothly_where_the_seed_has_seams() {
     };
     print("whole or not at all", &hard);
     print("graded", &graded);
-    assert!(largest_jump(&hard) > 1.5 * largest_jump(&graded));
-    assert!(largest_jump(&graded) < 1.3);
+    // Of each, about 0.07 is how well the variance can be told.
+    assert!(largest_jump(&hard) - 1.0 > 2.0 * (largest_jump(&graded) - 1.0));
+    assert!(largest_jump(&graded) < 1.15);
 }
