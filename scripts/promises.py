@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
-"""Measures what `candelabra-render` promises of error and time, and writes the tables of docs/error.md.
+"""Measures what `candelabra-render` promises of error; docs/error.md has the results.
 
     python3 scripts/promises.py target/release SCENE... [--res 96x54] [--depth 1] [--table FILE]
 
 For each scene a converged picture is rendered, in two halves with seeds of their own. Then:
 told over true error at 16, 64 and 256 samples; the true error where 0.1, 0.05 and 0.02 are asked for, and that of
-as many samples in every pixel; seconds used of those that were asked for. The measure is that of
+as many samples in every pixel, with the seconds of both. The measure is that of
 `src/render/noise`: the root mean square of the difference in the logarithm of luminance plus the grey floor.
 """
 import argparse

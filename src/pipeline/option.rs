@@ -10,8 +10,8 @@ use glam::{DVec3, Vec3};
 
 /// The largest width and height of a picture.
 const LARGEST_SIDE: u32 = 1 << 16;
-/// The most pixels: a pixel takes 64 bytes while a frame is rendered.
-const MOST_PIXELS: u64 = 1 << 27;
+/// The most pixels: a pixel takes about 250 bytes while a frame is rendered.
+const MOST_PIXELS: u64 = 1 << 26;
 /// More stops than this are beyond the range of a 32-bit number.
 const MOST_STOPS: f32 = 126.0;
 /// Coordinates in the world stay below this many metres, as those of a scene do.

@@ -80,7 +80,7 @@ fn a_frame_that_was_stopped_goes_on_from_its_checkpoint() {
     let mut stops = 0;
     loop {
         // Longer each time, so that it ends on any machine.
-        let patience = Duration::from_millis(150 + 100 * stops);
+        let patience = Duration::from_millis(400 * (1 + stops));
         if shot.render_for(arguments, patience) == Some(0) {
             break;
         }
