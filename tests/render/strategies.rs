@@ -20,7 +20,7 @@ use glam::{DVec3, Vec3};
 pub const SIZE: u32 = 16;
 /// The standard error of a picture's mean that is asked for, as a share of it, by its variance
 /// buffer.
-const WANTED: f64 = 0.005;
+const WANTED: f64 = 0.010;
 const MOST_SAMPLES: u32 = 32_768;
 /// Standard errors by which the means of two pictures may differ.
 const SIGMAS: f64 = 5.0;
