@@ -7,6 +7,7 @@ mod fog;
 mod gltf;
 mod malformed;
 mod mended;
+mod mended_textures;
 mod obj;
 mod open_exr;
 #[path = "../fuzz/probe/scene.rs"]

@@ -3,20 +3,16 @@
 
 use crate::moving::carousel;
 use crate::rooms;
-use crate::stage::{Set, Stage, at, direct, facing, glow, lambert};
+use crate::stage::{Set, Stage, at, direct, facing, lambert};
 use candelabra::render::buffers::RenderBuffers;
 use candelabra::render::exr::write_exr;
-use candelabra::render::passes::Uniform;
-use candelabra::render::{
-    Aov, FrameStats, LightStrategy, Progress, RenderDelegate, RenderError, RenderSettings, Window,
-};
+use candelabra::render::{Aov, LightStrategy, RenderDelegate, RenderError, RenderSettings, Window};
 use candelabra::scene::{Camera, Channel, Interpolation, Keys, LightKind, Medium, Scene, Trs};
 use clap::ValueEnum;
 use exr::meta::attribute::AttributeValue;
 use exr::prelude::{ReadChannels, ReadLayers, f16, read};
 use glam::{DVec3, Quat, Vec3};
 use std::collections::{BTreeMap, HashMap};
-use std::sync::atomic::{AtomicU64, Ordering};
 
 const FRAME: i32 = 13;
 
@@ -34,7 +30,7 @@ fn everything() -> Stage {
     stage
 }
 
-fn all_layers(size: u32, samples: u32) -> RenderSettings {
+pub fn all_layers(size: u32, samples: u32) -> RenderSettings {
     RenderSettings {
         depth: 3,
         aovs: Aov::value_variants().to_vec(),
@@ -48,13 +44,13 @@ fn set_of(scene: &Scene) -> Set<'_> {
 }
 
 /// Channels of a file by name, and its texts by attribute.
-struct File {
-    channels: Vec<(String, Vec<f32>)>,
+pub struct File {
+    pub channels: Vec<(String, Vec<f32>)>,
     texts: HashMap<String, String>,
 }
 
 impl File {
-    fn of(buffers: &RenderBuffers) -> File {
+    pub fn of(buffers: &RenderBuffers) -> File {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("f.exr");
         write_exr(&path, buffers, "{}").unwrap();
@@ -74,7 +70,7 @@ impl File {
         }
     }
 
-    fn channel(&self, name: &str) -> &[f32] {
+    pub fn channel(&self, name: &str) -> &[f32] {
         let found = self.channels.iter().find(|(own, _)| own == name);
         &found.unwrap_or_else(|| panic!("there is no {name}")).1
     }
@@ -143,7 +139,7 @@ fn no_layer_depends_on_what_else_is_asked_for() {
 }
 
 /// A floor under two points and a sky. Points and sky have the same random numbers whatever else there is.
-fn floor(lights: [bool; 3]) -> Stage {
+pub fn floor(lights: [bool; 3]) -> Stage {
     let mut stage = Stage::default();
     stage.quad([8.0; 2], lambert([0.6, 0.5, 0.4]), facing(DVec3::ZERO, DVec3::Y));
     stage.quad([2.0; 2], lambert([0.2, 0.5, 0.4]), facing([0.0, 1.0, -2.0], [0.0, 1.0, 5.0]));
@@ -367,63 +363,6 @@ fn positions_are_in_the_world_of_the_file() {
     let middle = 4 * 9 + 4;
     assert!(alpha[middle] == 1.0 && (x[middle] - 4096.0).abs() < 0.05, "{}", x[middle]);
     assert!((y[8 * 9 + 4] + 8192.0).abs() < 1e-3, "the floor is at {}", y[8 * 9 + 4]);
-}
-
-/// Two skies that are together brighter than a 32-bit number holds, behind a card in the upper half.
-#[test]
-fn samples_that_are_not_finite_are_left_out_counted_and_located() {
-    let mut stage = Stage::default();
-    for _ in 0..2 {
-        let radiance_nits = Vec3::splat(2e38);
-        stage.light(LightKind::Dome { radiance_nits, texture: None }, at(DVec3::ZERO));
-    }
-    stage.quad([20.0, 10.0], glow([5.0; 3]), at([0.0, 5.1, 0.0]));
-    stage.look([0.0, 0.0, 8.0], DVec3::ZERO, 1.0);
-    let settings = RenderSettings { depth: 0, light_groups: Vec::new(), ..all_layers(16, 4) };
-    let set = stage.set();
-    let camera = stage.scene.cameras[0].clone();
-    let delegate = RenderDelegate::new(&stage.scene, &set.emitters, camera, settings.clone());
-    let mut film = delegate.film().unwrap();
-    let frame = delegate.expose(&set.tree, 1, &mut film, &mut Uniform(4), &()).unwrap();
-    let FrameStats { non_finite, first_non_finite, .. } = frame.stats;
-    let left_out: Vec<u32> =
-        film.halves().iter().map(|pixel| 4 - pixel.counts.iter().sum::<u32>()).collect();
-    assert!(non_finite > 0 && u64::from(left_out.iter().sum::<u32>()) == non_finite);
-    let first = left_out.iter().position(|&count| count > 0).unwrap() as u32;
-    assert_eq!(first_non_finite, Some((first % 16, first / 16)));
-    let file = File::of(&frame.buffers);
-    let is_depth = |name: &str| name == "Z";
-    assert!(file.channels.iter().all(|(n, v)| is_depth(n) || v.iter().all(|v| v.is_finite())));
-    assert!(file.channel("G").contains(&5.0), "what is finite stays");
-    let alone = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
-    assert!(alone.install(|| delegate.render(&set.tree, 1, &()).unwrap()) == frame);
-}
-
-/// Stops after some questions.
-struct Patience(AtomicU64, u64);
-
-impl Progress for Patience {
-    fn is_stopped(&self) -> bool {
-        self.0.fetch_add(1, Ordering::Relaxed) >= self.1
-    }
-}
-
-#[test]
-fn a_stopped_frame_is_no_frame() {
-    let stage = floor([true; 3]);
-    let set = stage.set();
-    let camera = stage.scene.cameras[0].clone();
-    let settings = RenderSettings { width: 40, height: 8, samples: 16, ..direct(1, 1) };
-    let delegate = RenderDelegate::new(&stage.scene, &set.emitters, camera, settings);
-    // It is asked at the samples 0 and 256 of the 320 of each row in each of two passes.
-    for questions in [0, 1, 13, 31] {
-        let patience = Patience(AtomicU64::new(0), questions);
-        assert!(
-            matches!(delegate.render(&set.tree, 1, &patience), Err(RenderError::Stopped)),
-            "{questions}"
-        );
-    }
-    assert!(delegate.render(&set.tree, 1, &Patience(AtomicU64::new(0), 32)).is_ok());
 }
 
 #[test]

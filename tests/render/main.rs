@@ -19,6 +19,7 @@ mod ranges;
 mod real;
 mod references;
 mod rooms;
+mod samples;
 mod seams;
 mod shadows;
 #[path = "../ingest/shared.rs"]
