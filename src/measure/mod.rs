@@ -43,7 +43,7 @@ pub use frontier::{Point, Reach};
 pub use html::{html, svg};
 pub use machine::Machine;
 pub use picture::{Picture, Subject};
-pub use pilot::{FrameCost, ShotCost, grey_of};
+pub use pilot::{FrameCost, ShotCost};
 pub use probes::{ProbeOptions, ProbeReport, StrategyReport, at_probes, visited};
 pub use reference::Converged;
 pub use report::{Curve, Report, Row, Terms, Trade, csv};

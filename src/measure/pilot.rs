@@ -7,7 +7,6 @@
 
 use super::picture::Subject;
 use super::trade::{Account, Onlooker};
-use crate::math::color::luminance;
 use crate::render::noise::Grey;
 use crate::render::passes::{ErrorGoal, ToError};
 use crate::render::{RenderError, RenderSettings};
@@ -16,8 +15,6 @@ use std::time::Instant;
 
 /// Rows of the small pictures.
 const HEIGHT: u32 = 54;
-/// Samples of a pixel from which the grey floor is told.
-const SAMPLES: u32 = 16;
 /// A pixel of a small picture gets no more samples.
 const MOST: u32 = 64;
 
@@ -59,27 +56,16 @@ impl<D: AsRef<[u8]>> Subject<'_, '_, D> {
         RenderSettings {
             width: columns,
             height: rows,
-            samples: SAMPLES,
             aovs: Vec::new(),
             crop: None,
             ..self.base.clone()
         }
     }
 
-    /// The luminances of a small picture of the frame.
-    ///
-    /// # Errors
-    /// If the tree lacks the frame, the settings do not fit the scene, or the onlooker stops it.
-    pub fn glimpse(&mut self, onlooker: &dyn Onlooker) -> Result<Vec<f64>, RenderError> {
-        self.delegate.set_settings(self.small());
-        let rendered = self.delegate.render(self.tree, self.frame, &Account::new(onlooker, 0.0))?;
-        Ok(rendered.buffers.beauty().map(|color| f64::from(luminance(color))).collect())
-    }
-
     /// What the frame will take to reach a goal.
     ///
     /// # Errors
-    /// As [`glimpse`](Self::glimpse).
+    /// If the tree lacks the frame, the settings do not fit the scene, or the onlooker stops it.
     pub fn pilot(
         &mut self,
         goal: ErrorGoal,
@@ -109,11 +95,6 @@ impl<D: AsRef<[u8]>> Subject<'_, '_, D> {
             capped: needed.iter().filter(|&&count| count >= most).count() as f64 / small,
         })
     }
-}
-
-/// The grey floor of a shot, from the luminances of some of its frames.
-pub fn grey_of(frames: &[Vec<f64>]) -> Grey {
-    Grey::of(frames.iter().flatten().copied())
 }
 
 impl ShotCost {

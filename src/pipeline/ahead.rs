@@ -1,42 +1,42 @@
-//! What a shot looks like, from small pictures of a few of its frames.
+//! What is found out about a shot before its frames are rendered, from small pictures of a few of them.
 //!
 //! Previews flicker if each process chooses an exposure from the frames that it happens to render, and
 //! noise pumps if each chooses a grey floor. So both are chosen from frames of the scene, whatever frames
-//! are asked for: the exposure from the first, the grey floor from the first, the middle and the last.
+//! are asked for: the exposure from the first, the grey floor from [three](frames_of_grey). The knobs of
+//! splitting are chosen by a [pilot](crate::render::knob::pilot) in the first.
 
-use super::shot::Shot;
 use crate::light_tree::LightTree;
 use crate::math::color::luminance;
-use crate::pipeline::Watch;
 use crate::render::beauty::Beauty;
+use crate::render::knob::{Knobs, pilot_pays};
 use crate::render::png::exposure_for;
-use crate::render::{Progress, RenderDelegate, RenderError, RenderSettings};
+use crate::render::{Progress, RenderDelegate, RenderError, RenderSettings, Split};
 
 /// Rows of the small pictures.
 const HEIGHT: u32 = 27;
 /// Samples of each of their pixels.
 const SAMPLES: u32 = 8;
 
-/// A small picture of a frame.
-pub(super) struct Glimpse {
+/// What a small picture of a frame shows.
+pub struct Glimpse {
     /// Stops that bring its middle to middle grey.
     pub exposure: f32,
     /// Of its pixels.
     pub luminances: Vec<f64>,
 }
 
-/// Looks at a frame.
+/// Renders a small picture of a frame. The delegate must have `settings`, and has them afterwards.
 ///
 /// # Errors
-/// If the tree lacks the frame, or the job is stopped.
-pub(super) fn glimpse(
-    shot: &Shot,
+/// If the tree lacks the frame, or `progress` stops it.
+pub fn glimpse(
     delegate: &mut RenderDelegate,
+    settings: &RenderSettings,
     tree: &LightTree<&[u8]>,
     frame: i32,
-    watch: &dyn Watch,
+    progress: &impl Progress,
 ) -> Result<Glimpse, RenderError> {
-    let RenderSettings { width, height, .. } = shot.settings;
+    let RenderSettings { width, height, .. } = *settings;
     let columns = u64::from(width) * u64::from(HEIGHT) / u64::from(height);
     delegate.set_settings(RenderSettings {
         width: columns.clamp(1, 4 * u64::from(HEIGHT)) as u32,
@@ -45,20 +45,48 @@ pub(super) fn glimpse(
         aovs: Vec::new(),
         light_groups: Vec::new(),
         crop: None,
-        ..shot.settings.clone()
+        ..settings.clone()
     });
-    let rendered = delegate.render(tree, frame, &Patience(watch));
-    delegate.set_settings(shot.settings.clone());
+    let rendered = delegate.render(tree, frame, progress);
+    delegate.set_settings(settings.clone());
     let picture = Beauty::of(&rendered?.buffers, true);
     let luminances = picture.pixels.iter().map(|&color| f64::from(luminance(color))).collect();
     Ok(Glimpse { exposure: exposure_for(&picture), luminances })
 }
 
-/// Tells nothing, and hears when to stop.
-struct Patience<'a>(&'a dyn Watch);
+/// The frames of a scene that the grey floor is chosen from: the first, the middle and the last.
+pub fn frames_of_grey(frames: &[i32]) -> Vec<i32> {
+    let mut seen: Vec<i32> = [0, frames.len() / 2, frames.len().saturating_sub(1)]
+        .iter()
+        .filter_map(|&at| frames.get(at).copied())
+        .collect();
+    seen.dedup();
+    seen
+}
 
-impl Progress for Patience<'_> {
-    fn is_stopped(&self) -> bool {
-        self.0.is_stopped()
-    }
+/// The settings with the knobs of splitting that are best for the shot. `pilot` asks the delegate, and is
+/// called only if there is anything to find out. Where noise decides how many samples there will be,
+/// those of the settings are only the most, and the usual number is taken for them.
+///
+/// # Errors
+/// Those of `pilot`.
+pub fn with_knobs<E>(
+    delegate: &mut RenderDelegate,
+    settings: &RenderSettings,
+    noise_decides: bool,
+    pilot: impl FnOnce(&RenderDelegate) -> Result<Knobs, E>,
+) -> Result<RenderSettings, E> {
+    let usual = RenderSettings::default().samples;
+    let samples = if noise_decides { settings.samples.min(usual) } else { settings.samples };
+    let asked = RenderSettings { samples, ..settings.clone() };
+    let knobs = match pilot_pays(&asked) {
+        true => {
+            delegate.set_settings(asked);
+            let knobs = pilot(delegate);
+            delegate.set_settings(settings.clone());
+            knobs?
+        }
+        false => settings.split.knobs(),
+    };
+    Ok(RenderSettings { split: Split::ByBounce(knobs), ..settings.clone() })
 }

@@ -14,6 +14,7 @@
 //! | [`Stamp`] | what was a picture rendered from? |
 
 mod agreement;
+mod ahead;
 mod build;
 mod build_job;
 mod content;
@@ -37,6 +38,7 @@ mod view;
 mod watch;
 
 pub use agreement::{Contradiction, Standing, standing};
+pub use ahead::{Glimpse, frames_of_grey, glimpse, with_knobs};
 pub use build::{Rebuilt, build_tree, origin_of, rebuild_tree};
 pub use build_job::{BreakEven, BuildError, BuildJob, BuildReport, Built, TakenOver};
 pub use content::scene_fingerprint;

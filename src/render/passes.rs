@@ -6,7 +6,7 @@
 //! may save the film.
 
 use super::Film;
-use super::noise::{Allotment, Estimate, FrameError, Grey, mask};
+use super::noise::{Allotment, FrameError, Grey, mask};
 
 /// Receives the progress of a frame.
 pub trait Progress: Sync {
@@ -54,6 +54,8 @@ pub struct Uniform(pub u32);
 
 /// Samples of each pixel in the first pass.
 pub const FIRST: u32 = 8;
+/// The aim is lowered so often at most before all that can have more samples has them.
+const TIGHTER: usize = 16;
 
 impl Control for Uniform {
     fn next(&mut self, film: &Film) -> Option<Vec<u32>> {
@@ -101,7 +103,6 @@ pub struct ErrorGoal {
 pub struct ToError {
     goal: ErrorGoal,
     needed: f64,
-    reached: Reached,
 }
 
 /// What a frame's noise has come to.
@@ -122,7 +123,8 @@ impl ErrorGoal {
     }
 
     /// What a film has reached of it.
-    pub fn reached(&self, estimate: &Estimate) -> Reached {
+    pub fn reached(&self, film: &Film) -> Reached {
+        let estimate = film.estimate(self.grey);
         let pixels = || 0..estimate.pixels();
         let is_capped = |i: &usize| {
             estimate.samples(*i) >= f64::from(self.most) && estimate.error(*i) > 2.0 * self.error
@@ -138,17 +140,12 @@ impl ErrorGoal {
 impl ToError {
     /// Towards a goal.
     pub fn new(goal: ErrorGoal) -> ToError {
-        ToError { goal, needed: 0.0, reached: Reached::default() }
+        ToError { goal, needed: 0.0 }
     }
 
     /// What is asked for.
     pub fn goal(&self) -> ErrorGoal {
         self.goal
-    }
-
-    /// What was reached, by the last look at the film.
-    pub fn reached(&self) -> Reached {
-        self.reached
     }
 }
 
@@ -159,8 +156,7 @@ impl Control for ToError {
             return Some(vec![allotment.least; film.taken().len()]);
         }
         let estimate = film.estimate(self.goal.grey);
-        self.reached = self.goal.reached(&estimate);
-        let bound = self.reached.frame.bound;
+        let bound = estimate.of_frame().bound;
         // Lower than the goal if that does not prove enough. It begins with the goal each time: a
         // frame that is gone on with must decide as one that was never stopped.
         let mut aim = self.goal.error;
@@ -193,6 +189,3 @@ pub fn spread(film: &Film, wish: &[u32], samples: f64) -> Vec<u32> {
     let more = |i: usize| each.floor() as u32 + u32::from(mask(i, width) < each.fract());
     pairs().enumerate().map(|(i, (&taken, &wish))| (taken + more(i)).min(wish).max(taken)).collect()
 }
-
-/// The aim is lowered so often at most before all that can have more samples has them.
-const TIGHTER: usize = 16;

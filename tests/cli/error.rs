@@ -72,6 +72,17 @@ fn a_picture_that_was_limited_by_time_is_repeated_by_its_plan() {
     ]);
 }
 
+/// However short the time, every pixel has samples, and the user hears of it. An audit is beside the time.
+#[test]
+fn a_time_that_is_too_short_gives_a_picture_and_a_note() {
+    let shot = Shot::still();
+    let arguments = "--time 0.01 --audit 20 --res 96x64 -o a.exr";
+    shot.render(arguments).ends(0).complains(&["frame 1", "--time"]);
+    assert!(picture(&shot.path("a.exr")).unwrap().iter().any(|pixel| pixel[0] > 0.0));
+    let noise = noise_of(&shot, "a.exr");
+    assert!(noise.samples >= 2.0 && noise.audit.is_some(), "{noise:?}");
+}
+
 #[test]
 fn a_frame_that_was_stopped_goes_on_from_its_checkpoint() {
     let shot = Shot::still();
@@ -88,6 +99,7 @@ fn a_frame_that_was_stopped_goes_on_from_its_checkpoint() {
         assert!(stops < 300, "it never ends");
         assert!(!shot.path("a.exr").exists());
     }
+    assert!(stops > 0, "it was never stopped");
     assert!(shot.read("a.exr") == shot.read("whole.exr"), "after {stops} stops");
     assert!(!shot.path("a.exr.checkpoint").exists());
 }

@@ -37,7 +37,8 @@ impl Studio<'_> {
     fn to_error(&self, seed: u32, goal: ErrorGoal) -> (Film, RenderedFrame, Reached) {
         let mut control = ToError::new(goal);
         let (film, frame) = self.expose(seed, &mut control);
-        (film, frame, control.reached())
+        let reached = goal.reached(&film);
+        (film, frame, reached)
     }
 
     /// A converged picture.

@@ -4,12 +4,13 @@ use crate::display::Display;
 use crate::measure::{Arguments, Teller};
 use crate::stderr::say;
 use anyhow::{Context, Result};
-use candelabra::measure::{FrameCost, Onlooker, ShotCost, Subject, grey_of};
+use candelabra::measure::{FrameCost, Onlooker, ShotCost, Subject};
 use candelabra::page::{Lines, Short, counted};
 use candelabra::pipeline::{self, Effort, Event, ShotTrees, Watch};
+use candelabra::render::knob;
 use candelabra::render::noise::{Grey, decibels};
 use candelabra::render::passes::ErrorGoal;
-use candelabra::render::{RenderDelegate, RenderError, RenderSettings};
+use candelabra::render::{Progress, RenderDelegate, RenderError, RenderSettings};
 use std::io::Write;
 
 /// Frames that are looked at unless the user says how many.
@@ -37,7 +38,8 @@ pub fn run(arguments: &Arguments, display: &Display) -> Result<ShotCost> {
     };
     frames.sort_unstable();
     let emitters = pipeline::collect_emitters::<&[u8]>(&scene, None, &|_, _| {});
-    let trees = ShotTrees::built(&scene, &emitters).with_context(|| path.display().to_string())?;
+    let mut trees =
+        ShotTrees::built(&scene, &emitters).with_context(|| path.display().to_string())?;
     let usual = RenderSettings::default();
     let base = RenderSettings {
         width,
@@ -47,15 +49,27 @@ pub fn run(arguments: &Arguments, display: &Display) -> Result<ShotCost> {
         seed: arguments.seed,
         ..usual
     };
-    let delegate = RenderDelegate::new(&scene, &emitters, look.camera, base.clone());
-    let mut shot = Shot { trees, delegate, base };
+    let mut delegate = RenderDelegate::new(&scene, &emitters, look.camera, base.clone());
     let teller = Teller(display);
+    let own = pipeline::frames_of(&scene);
+    // As a render of the shot will find them out.
     let grey = match arguments.grey {
         Some(grey) => grey,
-        None => grey_floor(&pipeline::frames_of(&scene), |frame| {
-            shot.at(frame, |subject| subject.glimpse(&teller))
-        })?,
+        None => {
+            let mut luminances = Vec::new();
+            for frame in pipeline::frames_of_grey(&own) {
+                let tree = trees.for_frame(frame)?;
+                let quiet = Quiet(&teller);
+                let seen = pipeline::glimpse(&mut delegate, &base, &tree, frame, &quiet)?;
+                luminances.extend(seen.luminances);
+            }
+            Grey::of(luminances.into_iter())
+        }
     };
+    let base = pipeline::with_knobs(&mut delegate, &base, true, |delegate| {
+        anyhow::Ok(knob::pilot(delegate, &trees.for_frame(own[0])?, own[0])?)
+    })?;
+    let mut shot = Shot { trees, delegate, base };
     let goal = ErrorGoal { error: arguments.error, grey, most: Effort::MOST };
     let pilots = pilots(&frames, arguments.every);
     let mut costs: Vec<FrameCost> = Vec::new();
@@ -86,14 +100,6 @@ impl Shot<'_> {
     }
 }
 
-/// The grey floor of a shot: of the scene's first, middle and last frame, as a render takes it.
-fn grey_floor(frames: &[i32], glimpse: impl FnMut(i32) -> Result<Vec<f64>>) -> Result<Grey> {
-    let mut seen = [frames[0], frames[frames.len() / 2], frames[frames.len() - 1]].to_vec();
-    seen.dedup();
-    let pictures: Result<Vec<Vec<f64>>> = seen.into_iter().map(glimpse).collect();
-    Ok(grey_of(&pictures?))
-}
-
 /// Hears when to stop, and leaves it to the loop over the frames to tell how far it is.
 struct Quiet<'a, 'b>(&'a Teller<'b>);
 
@@ -102,6 +108,12 @@ impl Onlooker for Quiet<'_, '_> {
 
     fn is_at(&self, _: f64) {}
 
+    fn is_stopped(&self) -> bool {
+        self.0.is_stopped()
+    }
+}
+
+impl Progress for Quiet<'_, '_> {
     fn is_stopped(&self) -> bool {
         self.0.is_stopped()
     }

@@ -83,6 +83,11 @@ impl Deadline {
         until - self.reserve
     }
 
+    /// Whether it is known how long samples take.
+    pub fn knows_rate(&self) -> bool {
+        self.rate > 0.0
+    }
+
     /// A pass begins, with so many samples taken.
     pub fn begin(&mut self, samples: u64) {
         self.pass = Some((Instant::now(), samples));
@@ -106,6 +111,6 @@ impl Deadline {
 
     /// How many samples there will be in the end, if that is known.
     pub fn expected(&self, taken: u64) -> Option<u64> {
-        (self.rate > 0.0).then(|| taken + (self.rate * self.left().max(0.0)) as u64)
+        self.knows_rate().then(|| taken + (self.rate * self.left().max(0.0)) as u64)
     }
 }

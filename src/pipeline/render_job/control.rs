@@ -4,8 +4,12 @@ use super::checkpoint::Checkpoint;
 use super::clock::Deadline;
 use super::effort::Effort;
 use crate::render::noise::{Allotment, Grey};
-use crate::render::passes::{ErrorGoal, FIRST, Planned, Reached, ToError, Uniform, spread};
+use crate::render::passes::{ErrorGoal, Planned, ToError, Uniform, spread};
 use crate::render::{Control, Film};
+
+/// Samples of each pixel in the first pass of a frame that has a time. It is not interrupted: a picture
+/// without samples is none.
+pub(super) const FIRST_IN_TIME: u32 = 2;
 
 /// The control of one frame.
 pub(super) struct FrameControl<'a> {
@@ -39,20 +43,23 @@ impl<'a> FrameControl<'a> {
             (Some(counts), _) => Way::Planned(Planned(counts)),
             (None, Some(grey)) if effort.looks() => match effort.error {
                 Some(error) => Way::Error(ToError::new(ErrorGoal { error, grey, most })),
-                // A first pass of two: nothing is known about the time that samples take.
-                None => Way::Time(Allotment { least: 2.min(most), most }, grey),
+                None => Way::Time(Allotment { least: FIRST_IN_TIME.min(most), most }, grey),
             },
             _ => Way::Uniform(Uniform(most)),
         };
         FrameControl { way, deadline, checkpoint }
     }
 
-    /// What was reached of the noise that was asked for.
-    pub fn reached(&self) -> Option<Reached> {
-        match &self.way {
-            Way::Error(control) => Some(control.reached()),
-            _ => None,
-        }
+    /// How many samples the frame must have before its time may interrupt it: as many as the first pass
+    /// gives it.
+    pub fn least_samples(&self, film: &Film) -> u64 {
+        let each = match &self.way {
+            Way::Uniform(Uniform(most)) => FIRST_IN_TIME.min(*most),
+            Way::Planned(_) => FIRST_IN_TIME,
+            Way::Error(control) => FIRST_IN_TIME.min(control.goal().most),
+            Way::Time(allotment, _) => allotment.least,
+        };
+        u64::from(each) * film.taken().len() as u64
     }
 
     /// The next pass if time did not matter.
@@ -92,10 +99,11 @@ impl Control for FrameControl<'_> {
     fn next(&mut self, film: &Film) -> Option<Vec<u32>> {
         let wish = self.wish(film)?;
         let Some(deadline) = &mut self.deadline else { return Some(wish) };
-        if film.samples() == 0 {
-            let first = wish.iter().map(|&wish| wish.min(FIRST_IN_TIME)).collect();
+        if !deadline.knows_rate() {
+            // How long samples take is learnt from few of them.
+            let few = |(&wish, taken): (&u32, &u32)| wish.min(taken + FIRST_IN_TIME);
             deadline.begin(film.samples());
-            return Some(first);
+            return Some(wish.iter().zip(film.taken()).map(few).collect());
         }
         let samples = deadline.samples_of_next_pass()?;
         let missing: u64 =
@@ -131,6 +139,3 @@ impl Control for FrameControl<'_> {
         }
     }
 }
-
-/// Samples of each pixel in the first pass of a frame that has a time.
-const FIRST_IN_TIME: u32 = FIRST / 4;

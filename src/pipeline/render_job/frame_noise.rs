@@ -3,7 +3,7 @@
 use crate::light_tree::LightTree;
 use crate::math::random::hash;
 use crate::render::noise::{Grey, Halves, Reference, decibels};
-use crate::render::passes::{ErrorGoal, Planned, Reached};
+use crate::render::passes::{ErrorGoal, Planned};
 use crate::render::{Film, Progress, RenderDelegate, RenderError, RenderSettings};
 use serde::{Deserialize, Serialize};
 
@@ -47,19 +47,18 @@ pub struct Audit {
 }
 
 impl FrameNoise {
-    /// Of a finished film; `None` without a grey floor, or with less than two samples.
+    /// Of a finished film, whose pixels may have had `allowed` samples; `None` without a grey floor, or
+    /// with less than two samples.
     pub fn of(
         film: &Film,
         grey: Option<Grey>,
         asked: Option<f64>,
-        reached: Option<Reached>,
+        allowed: u32,
     ) -> Option<FrameNoise> {
         let grey = grey?;
         let most = film.taken().iter().copied().max().filter(|&most| most > 1)?;
-        let reached = reached.unwrap_or_else(|| {
-            let goal = ErrorGoal { error: f64::INFINITY, grey, most: u32::MAX };
-            goal.reached(&film.estimate(grey))
-        });
+        let error = asked.unwrap_or(f64::INFINITY);
+        let reached = ErrorGoal { error, grey, most: allowed }.reached(film);
         Some(FrameNoise {
             error: reached.frame.error,
             bound: reached.frame.bound,

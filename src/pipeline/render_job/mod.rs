@@ -10,7 +10,6 @@
 //! others. The picture of a frame depends on the job and on that frame alone, not on which other frames this
 //! process renders, nor on how often it was stopped before.
 
-mod ahead;
 mod checkpoint;
 mod clock;
 mod control;

@@ -1,9 +1,8 @@
 //! Frame after frame.
 
-use super::ahead::{Glimpse, glimpse};
 use super::checkpoint::Checkpoint;
 use super::clock::{Clock, Deadline};
-use super::control::FrameControl;
+use super::control::{FIRST_IN_TIME, FrameControl};
 use super::frame_noise::{FrameNoise, audit};
 use super::outputs::Outputs;
 use super::plan::read_counts;
@@ -14,12 +13,13 @@ use super::{RenderError, RenderJob};
 use crate::emitter::Emitters;
 use crate::light_tree::LightTree;
 use crate::pipeline::{
-    Event, PreviewStamp, ShotTrees, Stamp, Stamper, TreeError, Watch, frames_of,
+    Event, Glimpse, PreviewStamp, ShotTrees, Stamp, Stamper, TreeError, Watch, frames_of,
+    frames_of_grey, glimpse, with_knobs,
 };
 use crate::render::beauty::Beauty;
 use crate::render::knob::pilot;
 use crate::render::noise::Grey;
-use crate::render::{self, Progress, RenderDelegate, RenderSettings, Split};
+use crate::render::{self, Progress, RenderDelegate, RenderSettings};
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 use std::time::{Duration, Instant};
@@ -158,8 +158,7 @@ impl<'a> Pass<'a> {
         let settings = self.settings()?;
         let stamp = self.stamp(frame, plan.as_deref())?;
         let deadline = self.deadline(writer);
-        self.progress.until = deadline.as_ref().map(Deadline::latest);
-
+        let until = deadline.as_ref().map(Deadline::latest);
         let Pass { job, delegate, shot, emitters, trees, progress, watch, clock, .. } = self;
         let delegate = prepared(delegate, shot, emitters, *watch, clock);
         delegate.set_settings(settings.clone());
@@ -173,13 +172,26 @@ impl<'a> Pass<'a> {
         }
         let leftover = checkpoint.as_ref().map(|own| own.path().to_path_buf());
         let mut control = FrameControl::new(&job.effort, plan, grey, deadline, checkpoint);
+        progress.cut = until.map(|until| Cut { until, least: control.least_samples(&film) });
         let rendered = delegate.expose(&tree, frame, &mut film, &mut control, &*progress)?;
-        let reached = control.reached();
+        if let Some(late) =
+            until.map(|until| until.elapsed().as_secs_f64()).filter(|late| *late > 0.1)
+        {
+            watch.tell(Event::Note {
+                text: format!(
+                    "frame {frame}: preparation and {FIRST_IN_TIME} samples of each pixel took {late:.1} s \
+                     longer than --time allows"
+                ),
+            });
+        }
         let seconds = clock.lap(|seconds| &mut seconds.rendering);
-        let mut noise = FrameNoise::of(&film, grey, job.effort.error, reached);
+        let (asked, allowed) = (job.effort.error, job.effort.samples);
+        let mut noise = FrameNoise::of(&film, grey, asked, allowed);
         if let (Some(pixels), Some(grey), Some(noise)) = (job.audit, grey, &mut noise) {
+            // Its time is over; the audit is beside it.
+            let quiet = Patience(*watch);
             let audited =
-                audit(delegate, &tree, frame, (&film, grey), &shot.settings, (pixels, &*progress))?;
+                audit(delegate, &tree, frame, (&film, grey), &settings, (pixels, &quiet))?;
             noise.audit = Some(audited);
             clock.lap(|seconds| &mut seconds.audit);
         }
@@ -231,9 +243,7 @@ impl<'a> Pass<'a> {
         if effort.grey.is_some() || !(effort.looks() || self.job.audit.is_some()) {
             return Ok(effort.grey);
         }
-        let frames = frames_of(&self.shot.scene);
-        let mut seen = [frames[0], frames[frames.len() / 2], frames[frames.len() - 1]].to_vec();
-        seen.dedup();
+        let seen = frames_of_grey(&frames_of(&self.shot.scene));
         for &frame in &seen {
             self.glimpse(frame)?;
         }
@@ -248,19 +258,13 @@ impl<'a> Pass<'a> {
             return Ok(settings.clone());
         }
         let Pass { job, delegate, shot, emitters, trees, watch, clock, .. } = self;
-        let samples = match job.effort.looks() {
-            true => shot.settings.samples.min(RenderSettings::default().samples),
-            false => shot.settings.samples,
-        };
         let delegate = prepared(delegate, shot, emitters, *watch, clock);
-        delegate.set_settings(RenderSettings { samples, ..shot.settings.clone() });
         let frame = frames_of(&shot.scene)[0];
-        let knobs = of_any_frame(shot, emitters, trees, frame, |tree| {
-            pilot(delegate, tree, frame).map_err(render::RenderError::from)
+        let found = with_knobs(delegate, &shot.settings, job.effort.looks(), |delegate| {
+            of_any_frame(shot, emitters, trees, frame, |tree| Ok(pilot(delegate, tree, frame)?))
         })?;
-        self.clock.lap(|seconds| &mut seconds.ahead);
-        let split = Split::ByBounce(knobs);
-        Ok(self.settings.insert(RenderSettings { split, ..self.shot.settings.clone() }).clone())
+        clock.lap(|seconds| &mut seconds.ahead);
+        Ok(self.settings.insert(found).clone())
     }
 
     /// A small picture of a frame.
@@ -269,7 +273,7 @@ impl<'a> Pass<'a> {
             let Pass { delegate, shot, emitters, trees, watch, clock, .. } = self;
             let delegate = prepared(delegate, shot, emitters, *watch, clock);
             let seen = of_any_frame(shot, emitters, trees, frame, |tree| {
-                glimpse(shot, delegate, tree, frame, *watch)
+                glimpse(delegate, &shot.settings, tree, frame, &Patience(*watch))
             })?;
             self.clock.lap(|seconds| &mut seconds.ahead);
             self.glimpses.insert(frame, seen);
@@ -347,27 +351,45 @@ fn prepared<'d, 'a>(
     })
 }
 
+/// Tells nothing, and hears when to stop.
+struct Patience<'a>(&'a dyn Watch);
+
+impl Progress for Patience<'_> {
+    fn is_stopped(&self) -> bool {
+        self.0.is_stopped()
+    }
+}
+
+/// When rendering is interrupted for time.
+struct Cut {
+    until: Instant,
+    /// Not in a pass that begins with fewer samples.
+    least: u64,
+}
+
 /// How far a shot is: frames, and the samples of the one that is rendered.
 struct FrameProgress<'a> {
     watch: &'a dyn Watch,
     frames: usize,
     over: usize,
     frame: i32,
-    /// When the frame is interrupted.
-    until: Option<Instant>,
+    /// When the time of the frame interrupts it.
+    cut: Option<Cut>,
+    /// Samples when the pass began.
+    before: AtomicU64,
     taken: AtomicU64,
     all: AtomicU64,
 }
 
 impl FrameProgress<'_> {
     fn new(watch: &dyn Watch, frames: usize) -> FrameProgress<'_> {
-        let (taken, all) = (AtomicU64::new(0), AtomicU64::new(1));
-        FrameProgress { watch, frames, over: 0, frame: 0, until: None, taken, all }
+        let [before, taken, all] = [0, 0, 1].map(AtomicU64::new);
+        FrameProgress { watch, frames, over: 0, frame: 0, cut: None, before, taken, all }
     }
 
     fn frame_is_over(&mut self) {
         self.over += 1;
-        self.until = None;
+        self.cut = None;
         self.expects(0, 1);
     }
 
@@ -379,6 +401,7 @@ impl FrameProgress<'_> {
 
 impl Progress for FrameProgress<'_> {
     fn expects(&self, taken: u64, all: u64) {
+        self.before.store(taken, Relaxed);
         self.taken.store(taken, Relaxed);
         self.all.store(all.max(1), Relaxed);
         self.tell(taken as f64 / all.max(1) as f64);
@@ -390,6 +413,8 @@ impl Progress for FrameProgress<'_> {
     }
 
     fn is_stopped(&self) -> bool {
-        self.watch.is_stopped() || self.until.is_some_and(|until| Instant::now() >= until)
+        let is_late =
+            |cut: &Cut| self.before.load(Relaxed) >= cut.least && Instant::now() >= cut.until;
+        self.watch.is_stopped() || self.cut.as_ref().is_some_and(is_late)
     }
 }

@@ -19,7 +19,7 @@ mod pilot;
 mod prices;
 mod trial;
 
-pub use pilot::pilot;
+pub use pilot::{pilot, pilot_pays};
 pub(super) use trial::Trial;
 
 use serde::{Deserialize, Serialize};

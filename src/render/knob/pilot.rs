@@ -11,9 +11,9 @@ use super::{Knobs, Split};
 use crate::light_tree::{LightTree, NoSuchFrame};
 use crate::math::color::luminance;
 use crate::math::random::hash;
-use crate::render::RenderDelegate;
 use crate::render::noise::{Grey, Halves};
 use crate::render::path::{Integrator, PathScratch, TraceStats};
+use crate::render::{RenderDelegate, RenderSettings};
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -50,15 +50,23 @@ pub fn pilot(
     delegate.at_frame(tree, frame, knobs_for)
 }
 
-fn knobs_for(integrator: &Integrator) -> Knobs {
-    let settings = integrator.settings;
+/// Whether a pilot has anything to find out for these settings.
+pub fn pilot_pays(settings: &RenderSettings) -> bool {
+    pixels_for(settings).is_some()
+}
+
+/// How many pixels a pilot takes, if it pays.
+fn pixels_for(settings: &RenderSettings) -> Option<u64> {
     let paths = [settings.width, settings.height, settings.samples].map(u64::from);
     let pixels =
         (paths.iter().product::<u64>() / FRAME_PATHS / u64::from(2 * PATHS)).min(MOST_PIXELS);
     let is_asked = settings.split == Split::Auto && settings.strategy.splits();
-    if !is_asked || settings.depth == 0 || pixels < LEAST_PIXELS {
-        return settings.split.knobs();
-    }
+    (is_asked && settings.depth > 0 && pixels >= LEAST_PIXELS).then_some(pixels)
+}
+
+fn knobs_for(integrator: &Integrator) -> Knobs {
+    let settings = integrator.settings;
+    let Some(pixels) = pixels_for(settings) else { return settings.split.knobs() };
     let tried = |kind: usize, range: Range<usize>| {
         if kind < settings.depth as usize { range } else { 0..0 }
     };
