@@ -87,9 +87,11 @@ impl Beam {
             let discriminant = cos2
                 * (sin2 * axis.cross(moment).length_squared() - cos2 * axis.dot(moment).powi(2));
             // The stable pair of roots (Press et al., "Numerical Recipes", section 5.6). Where `a` is
-            // 0 the first is infinite and drops out.
+            // 0 the first is infinite and drops out. Without roots, the line is nearest the surface
+            // there: an end more does no harm, and a line through the apex needs it, whose discriminant
+            // is what rounding leaves.
             let q = -(b + discriminant.max(0.0).sqrt().copysign(b));
-            if discriminant > 0.0 { [q / a, c / q] } else { [0.0; 2] }
+            [q / a, c / q]
         };
         let within = roots.map(|t| if t > 0.0 && t < length { t } else { 0.0 });
         let mut ends = [0.0, within[0], within[1], length];
@@ -109,6 +111,25 @@ impl Beam {
 mod tests {
     use super::*;
     use proptest::prelude::*;
+
+    /// A ray from far away through the apex of a beam, up to its rounding: lit up to there.
+    #[test]
+    fn a_ray_through_the_apex_is_lit_on_one_side_of_it() {
+        let axis = DVec3::new(0.0, -0.184_972_068_724_901_02, -0.982_743_778_302_172_9);
+        let direction = DVec3::new(0.0, 0.574_534_378_502_319_6, 0.818_480_450_541_705_7);
+        for exponent in -12..10 {
+            for behind in [10f64.powi(exponent), 3.3 * 10f64.powi(exponent)] {
+                let beam = Beam { apex: -DVec3::Y, axis, half_angle_rad: 1.0 };
+                let off = beam.apex + 2e-16 * DVec3::X - behind * direction;
+                let (from, to) = beam.lit_part(off, direction, 3.0 * behind).unwrap();
+                let tolerance = 1e-15 * (behind + 1.0);
+                assert!(
+                    from == 0.0 && (to - behind).abs() <= 1e3 * tolerance,
+                    "{behind}: {from} {to}"
+                );
+            }
+        }
+    }
 
     fn unit() -> impl Strategy<Value = DVec3> {
         prop::array::uniform3(-1.0..1.0)
