@@ -13,7 +13,7 @@ use serde::de::DeserializeOwned;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
-/// A picture is of 2^27 pixels at most.
+/// A picture is smaller: 2^26 pixels of 12 bytes.
 const MOST_BYTES: u64 = 4 << 30;
 /// Digits of a hash that name a folder.
 const DIGITS: usize = 32;

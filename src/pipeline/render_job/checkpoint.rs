@@ -7,7 +7,7 @@
 use crate::pipeline::{Event, Stamp, Watch};
 use crate::render::Film;
 use crate::store::{read_regular, write_atomically};
-use std::io::Write;
+use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 
 /// What the file begins with.
@@ -35,10 +35,10 @@ impl<'a> Checkpoint<'a> {
         &self.path
     }
 
-    /// The film of an earlier job, if there is one of the same frame, whole; else the blank one.
-    pub fn restore(&self, blank: Film) -> Film {
-        let Ok(bytes) = read_regular(&self.path, MOST_BYTES) else { return blank };
-        let film = self.film_in(&bytes).and_then(|bytes| blank.clone().restored(bytes));
+    /// Fills a blank film from an earlier job, if it left one of the same frame, whole.
+    pub fn restore(&self, blank: Film) -> Option<Film> {
+        let bytes = read_regular(&self.path, MOST_BYTES).ok()?;
+        let film = self.film_in(&bytes).and_then(|bytes| blank.restored(bytes));
         if film.is_none() {
             let text = format!(
                 "{}: is not of this frame, scene and settings, or is not whole; the frame is begun anew",
@@ -46,40 +46,54 @@ impl<'a> Checkpoint<'a> {
             );
             self.watch.tell(Event::Note { text });
         }
-        film.unwrap_or(blank)
+        film
     }
 
-    /// The film's bytes in a file: magic, hash of all that follows, length of the stamp, stamp, film.
+    /// The film's bytes in a file: magic, length of the stamp, stamp, film, hash of all before it.
     fn film_in<'b>(&self, bytes: &'b [u8]) -> Option<&'b [u8]> {
-        let rest = bytes.strip_prefix(MAGIC)?;
-        let (hash, rest) = rest.split_at_checked(blake3::OUT_LEN)?;
-        let (length, after) = rest.split_at_checked(8)?;
+        let (content, hash) = bytes.split_at_checked(bytes.len().checked_sub(blake3::OUT_LEN)?)?;
+        let rest = content.strip_prefix(MAGIC)?;
+        let (length, rest) = rest.split_at_checked(8)?;
         let length = u64::from_le_bytes(length.try_into().ok()?);
-        let (stamp, film) = after.split_at_checked(length.try_into().ok()?)?;
+        let (stamp, film) = rest.split_at_checked(length.try_into().ok()?)?;
         let is_ours = serde_json::from_slice::<Stamp>(stamp).ok()?.is_of_same(self.stamp);
-        (is_ours && blake3::hash(rest).as_bytes() == hash).then_some(film)
+        (is_ours && blake3::hash(content).as_bytes() == hash).then_some(film)
     }
 
     /// Writes the film. If that fails the frame goes on without.
     pub fn write(&self, film: &Film) {
-        let written = self.bytes_of(film).and_then(|bytes| {
-            write_atomically(&self.path, |file| {
-                file.write_all(MAGIC)?;
-                file.write_all(blake3::hash(&bytes).as_bytes())?;
-                file.write_all(&bytes)
-            })
+        let written = write_atomically(&self.path, |file| {
+            let mut out = Hashed { out: BufWriter::new(file), hasher: blake3::Hasher::new() };
+            let stamp = serde_json::to_vec(self.stamp)?;
+            out.write_all(MAGIC)?;
+            out.write_all(&(stamp.len() as u64).to_le_bytes())?;
+            out.write_all(&stamp)?;
+            film.save(&mut out)?;
+            let hash = out.hasher.finalize();
+            out.out.write_all(hash.as_bytes())?;
+            out.out.flush()
         });
         if let Err(error) = written {
             let text = format!("{error}; the frame goes on without a checkpoint");
             self.watch.tell(Event::Note { text });
         }
     }
+}
 
-    fn bytes_of(&self, film: &Film) -> std::io::Result<Vec<u8>> {
-        let stamp = serde_json::to_vec(self.stamp)?;
-        let mut bytes = (stamp.len() as u64).to_le_bytes().to_vec();
-        bytes.extend(stamp);
-        film.save(&mut bytes)?;
-        Ok(bytes)
+/// Writes on, and hashes what it writes.
+struct Hashed<W> {
+    out: W,
+    hasher: blake3::Hasher,
+}
+
+impl<W: Write> Write for Hashed<W> {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        let written = self.out.write(bytes)?;
+        self.hasher.update(&bytes[..written]);
+        Ok(written)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.out.flush()
     }
 }

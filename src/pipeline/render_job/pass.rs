@@ -24,6 +24,9 @@ use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 use std::time::{Duration, Instant};
 
+/// Seconds to develop a pixel and write it, and as many for that of a preview: two cores, the usual layers.
+const SECONDS_A_PIXEL: f64 = 1e-6;
+
 /// One pass over the frames of a shot.
 pub(super) struct Pass<'a> {
     job: &'a RenderJob,
@@ -165,11 +168,13 @@ impl<'a> Pass<'a> {
         let tree = trees.for_frame(frame)?;
         clock.lap(|seconds| &mut seconds.trees);
         let picture = self.outputs.picture(frame);
-        let mut film = delegate.film().map_err(render::RenderError::from)?;
+        let blank = || delegate.film().map_err(render::RenderError::from);
         let checkpoint = job.checkpoint.then(|| Checkpoint::of(&picture, &stamp, *watch));
-        if let Some(checkpoint) = &checkpoint {
-            film = checkpoint.restore(film);
-        }
+        let earlier = checkpoint.as_ref().map(|own| Ok::<_, Trouble>(own.restore(blank()?)));
+        let mut film = match earlier.transpose()?.flatten() {
+            Some(film) => film,
+            None => blank()?,
+        };
         let leftover = checkpoint.as_ref().map(|own| own.path().to_path_buf());
         let mut control = FrameControl::new(&job.effort, plan, grey, deadline, checkpoint);
         progress.cut = until.map(|until| Cut { until, least: control.least_samples(&film) });
@@ -225,7 +230,16 @@ impl<'a> Pass<'a> {
     fn deadline(&self, writer: &Writer) -> Option<Deadline> {
         let each = self.job.effort.seconds?;
         let all = Duration::try_from_secs_f64(each * f64::from(self.rendered + 1)).ok()?;
-        Some(Deadline::new(self.clock.started() + all, each, writer.seconds_of_a_frame()))
+        let reserve = writer.seconds_of_a_frame().unwrap_or_else(|| self.seconds_to_write());
+        Some(Deadline::new(self.clock.started() + all, each, reserve))
+    }
+
+    /// How long writing a frame is likely to take, before one has been written.
+    fn seconds_to_write(&self) -> f64 {
+        let settings = &self.shot.settings;
+        let pixels = f64::from(settings.width) * f64::from(settings.height);
+        let preview = if self.job.preview.is_some() { SECONDS_A_PIXEL } else { 0.0 };
+        pixels * (SECONDS_A_PIXEL + preview)
     }
 
     /// Stops of previews, if there are any.

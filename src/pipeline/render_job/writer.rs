@@ -66,9 +66,10 @@ impl<'scope> Writer<'scope> {
         Writer { sender, thread: scope.spawn(move || writing.write_all(&receiver)), nanoseconds }
     }
 
-    /// How long it takes to write a frame: as long as the last one took, in seconds.
-    pub fn seconds_of_a_frame(&self) -> f64 {
-        self.nanoseconds.load(Relaxed) as f64 * 1e-9
+    /// How long it took to write the last frame, in seconds, if one was written.
+    pub fn seconds_of_a_frame(&self) -> Option<f64> {
+        let nanoseconds = self.nanoseconds.load(Relaxed);
+        (nanoseconds > 0).then_some(nanoseconds as f64 * 1e-9)
     }
 
     /// Hands over a frame. Waits until the one before is written. Whether it was taken: only a panic ends the
