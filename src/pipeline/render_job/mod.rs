@@ -19,6 +19,7 @@ mod frame_noise;
 mod outputs;
 mod pass;
 mod plan;
+mod progress;
 mod report;
 mod shot;
 mod writer;

@@ -6,6 +6,7 @@ use super::control::{FIRST_IN_TIME, FrameControl};
 use super::frame_noise::{FrameNoise, audit};
 use super::outputs::Outputs;
 use super::plan::read_counts;
+use super::progress::{Cut, FrameProgress, Patience};
 use super::report::FrameCounts;
 use super::shot::Shot;
 use super::writer::{Finished, Writer, write_preview};
@@ -19,10 +20,9 @@ use crate::pipeline::{
 use crate::render::beauty::Beauty;
 use crate::render::knob::pilot;
 use crate::render::noise::Grey;
-use crate::render::{self, Progress, RenderDelegate, RenderSettings};
+use crate::render::{self, RenderDelegate, RenderSettings};
 use std::collections::BTreeMap;
-use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 /// Seconds to develop a pixel and write it, and as many for that of a preview: two cores, the usual layers.
 const SECONDS_A_PIXEL: f64 = 1e-6;
@@ -363,72 +363,4 @@ fn prepared<'d, 'a>(
         clock.lap(|seconds| &mut seconds.rays);
         delegate
     })
-}
-
-/// Tells nothing, and hears when to stop.
-struct Patience<'a>(&'a dyn Watch);
-
-impl Progress for Patience<'_> {
-    fn is_stopped(&self) -> bool {
-        self.0.is_stopped()
-    }
-}
-
-/// When rendering is interrupted for time.
-struct Cut {
-    until: Instant,
-    /// Not in a pass that begins with fewer samples.
-    least: u64,
-}
-
-/// How far a shot is: frames, and the samples of the one that is rendered.
-struct FrameProgress<'a> {
-    watch: &'a dyn Watch,
-    frames: usize,
-    over: usize,
-    frame: i32,
-    /// When the time of the frame interrupts it.
-    cut: Option<Cut>,
-    /// Samples when the pass began.
-    before: AtomicU64,
-    taken: AtomicU64,
-    all: AtomicU64,
-}
-
-impl FrameProgress<'_> {
-    fn new(watch: &dyn Watch, frames: usize) -> FrameProgress<'_> {
-        let [before, taken, all] = [0, 0, 1].map(AtomicU64::new);
-        FrameProgress { watch, frames, over: 0, frame: 0, cut: None, before, taken, all }
-    }
-
-    fn frame_is_over(&mut self) {
-        self.over += 1;
-        self.cut = None;
-        self.expects(0, 1);
-    }
-
-    fn tell(&self, share_of_frame: f64) {
-        let done = (self.over as f64 + share_of_frame.min(1.0)) / self.frames.max(1) as f64;
-        self.watch.tell(Event::Progress { done, frame: Some(self.frame) });
-    }
-}
-
-impl Progress for FrameProgress<'_> {
-    fn expects(&self, taken: u64, all: u64) {
-        self.before.store(taken, Relaxed);
-        self.taken.store(taken, Relaxed);
-        self.all.store(all.max(1), Relaxed);
-        self.tell(taken as f64 / all.max(1) as f64);
-    }
-
-    fn samples_taken(&self, samples: u64) {
-        let taken = self.taken.fetch_add(samples, Relaxed) + samples;
-        self.tell(taken as f64 / self.all.load(Relaxed) as f64);
-    }
-
-    fn is_stopped(&self) -> bool {
-        let is_late =
-            |cut: &Cut| self.before.load(Relaxed) >= cut.least && Instant::now() >= cut.until;
-        self.watch.is_stopped() || self.cut.as_ref().is_some_and(is_late)
-    }
 }
