@@ -234,6 +234,16 @@ impl Emitters {
         &self.lights[self.get(emitter).light as usize]
     }
 
+    /// Whether a ray may hit any of them: triangles and spheres have a surface, points and spots have none.
+    pub fn have_surfaces(&self, scene: &Scene) -> bool {
+        self.lights.iter().any(|light| match light.source {
+            LightSource::Mesh { .. } => true,
+            LightSource::Light(row) => {
+                matches!(scene.lights[row as usize].kind, LightKind::Sphere { .. })
+            }
+        })
+    }
+
     /// The emitter that a triangle of an instance is, if it is one.
     #[inline]
     pub fn of_triangle(&self, instance: u32, triangle: u32) -> Option<u32> {

@@ -122,6 +122,9 @@ impl<'a> RenderDelegate<'a> {
             camera: CameraRays::new(&self.camera, &pose, width, height),
             fog: Fog::new(self.scene, &pose, &self.camera),
             groups: self.plan.as_ref().ok().and_then(|plan| plan.groups.as_ref()),
+            reflections_find_light: self.settings.mis
+                && (self.emitters.have_surfaces(self.scene)
+                    || infinite.iter().any(|light| light.visibility.reflections)),
         }))
     }
 

@@ -47,6 +47,8 @@ pub struct Integrator<'a> {
     pub fog: Option<Fog>,
     /// Which light group each light is in, if that is asked for.
     pub groups: Option<&'a LightGroups>,
+    /// Whether a reflected ray may find light by itself. If not, the last one of a path is not traced.
+    pub reflections_find_light: bool,
 }
 
 /// What one path saw. Its light by group is in [`PathScratch::by_group`].
@@ -212,6 +214,9 @@ impl Integrator<'_> {
             let at = (bounce, throughput);
             let direct = self.direct(&vertex, &wanted, numbers, &accept, at, scratch);
             seen.add(bounce + 1, throughput * direct);
+            if bounce + 1 == self.settings.depth && !self.reflections_find_light {
+                break;
+            }
 
             let [lobe, bu, bv, _] = sampler.next_4d();
             let Some(next) = vertex.reflection.sample(lobe, Vec2::new(bu, bv)) else { break };

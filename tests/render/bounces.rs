@@ -3,8 +3,8 @@
 
 use crate::stage::{Stage, at, direct, facing, glow, lambert};
 use crate::statistics::{Estimate, assert_even, pixels};
-use candelabra::render::RenderSettings;
 use candelabra::render::buffers::RenderBuffers;
+use candelabra::render::{RenderDelegate, RenderSettings};
 use candelabra::scene::{AlphaMode, LightKind, Material};
 use glam::{DVec3, Vec3};
 use std::f64::consts::PI;
@@ -145,6 +145,39 @@ fn an_integrating_sphere_is_a_geometric_series() {
             // Facets are nearer to the middle than the ball they approximate.
             let off = (seen.mean.x / expected - 1.0).abs();
             assert!(off < 4e-3, "{what}, {depth} bounces: {seen}, not {expected}");
+        }
+    }
+}
+
+/// A point cannot be hit. So of all scenes only those with light that has a surface or comes from infinity pay for the
+/// last reflected ray of a path.
+#[test]
+fn the_last_reflected_ray_is_traced_only_where_it_may_find_light() {
+    let intensity_cd = Vec3::ONE;
+    let radiance_nits = Vec3::ONE;
+    let lamps = [
+        (LightKind::Point { intensity_cd }, 0),
+        (LightKind::Sphere { radiance_nits, radius: 0.1, shaping: None }, 1),
+        (LightKind::Dome { radiance_nits, texture: None }, 1),
+    ];
+    for (kind, last) in lamps {
+        let what = format!("{kind:?}");
+        let mut stage = Stage::default();
+        room(&mut stage, &lambert(Vec3::splat(0.5)));
+        stage.light(kind, at(DVec3::ZERO));
+        stage.look(DVec3::new(0.0, 0.0, 0.9), DVec3::ZERO, 0.1);
+        let set = stage.set();
+        for depth in 1..=2 {
+            let settings = RenderSettings { depth, ..direct(4, 16) };
+            let delegate = RenderDelegate::new(
+                set.scene,
+                &set.emitters,
+                set.scene.cameras[0].clone(),
+                settings,
+            );
+            let stats = delegate.render(&set.tree, 1, &()).unwrap().stats.trace;
+            let rays = 4 * 4 * 16 * u64::from(depth + last);
+            assert_eq!(stats.rays - stats.shadow_rays, rays, "{what}, depth {depth}");
         }
     }
 }

@@ -19,11 +19,14 @@ use std::ops::Range;
 
 /// Paths through a pixel, in each of its two halves.
 const PATHS: u32 = 4;
-/// One pilot path for so many paths of a frame. With all that is tried on it, a path takes the time of
-/// about twelve.
+/// One pilot path for so many paths of a frame. With all that is tried on it, and the plain ones, it takes the
+/// time of about twenty.
 const FRAME_PATHS: u64 = 500;
 /// Pixels that are enough.
 const MOST_PIXELS: u64 = 512;
+/// The noise of everything but picking is in few pixels, those of edges and small lamps. So it is told from so
+/// many times as many pixels, on which no knobs are tried.
+const PLAIN: u32 = 8;
 /// With fewer nothing can be learnt.
 const LEAST_PIXELS: u64 = 24;
 /// No pixel is more than this share of the noise: one bright sample would decide alone.
@@ -72,7 +75,10 @@ fn knobs_for(integrator: &Integrator) -> Knobs {
     };
     let handicap = MOST_PIXELS as f64 / pixels as f64;
     let cheap = std::array::from_fn(|kind| tried(kind, 0..FIRST_COSTLY));
-    let mut findings = traced(integrator, pixels as u32, cheap);
+    let mut findings = Findings {
+        variance: variance(integrator, PLAIN * pixels as u32),
+        ..traced(integrator, pixels as u32, cheap)
+    };
     let best = findings.best(handicap);
     let costly: [Range<usize>; Knobs::KINDS] = std::array::from_fn(|kind| {
         let is_last = best.by_bounce[kind] >= KNOBS[FIRST_COSTLY - 1];
@@ -98,25 +104,35 @@ struct Pixel {
     own: TraceStats,
 }
 
-/// Traces the paths and tries some knobs at their points.
+/// The variance of pixels with the usual knobs.
+fn variance(integrator: &Integrator, pixels: u32) -> f64 {
+    let row = |number| pixel(integrator, number, &Default::default()).halves;
+    let pixels: Vec<Halves> = (0..pixels).into_par_iter().map(row).collect();
+    let grey = grey(pixels.iter());
+    steady_mean(pixels.iter().map(|halves| halves.squared_error(grey)).collect())
+}
+
+/// The grey floor for some pixels.
+fn grey<'a>(pixels: impl ExactSizeIterator<Item = &'a Halves>) -> Grey {
+    let count = pixels.len() as f64;
+    Grey::below(pixels.map(Halves::luminance).sum::<f64>() / count)
+}
+
+/// Traces the paths and tries some knobs at their points. The variance is not told.
 fn traced(integrator: &Integrator, pixels: u32, tried: [Range<usize>; Knobs::KINDS]) -> Findings {
     let row = |number| pixel(integrator, number, &tried);
     let pixels: Vec<Pixel> = (0..pixels).into_par_iter().map(row).collect();
     let count = pixels.len() as f64;
-    let mean = pixels.iter().map(|pixel| pixel.halves.luminance()).sum::<f64>() / count;
-    let grey = Grey::below(mean);
+    let grey = grey(pixels.iter().map(|pixel| &pixel.halves));
     let error = |of: &dyn Fn(&Pixel) -> f64| {
         let own = |pixel: &Pixel| grey.of_deviation(of(pixel), pixel.halves.luminance());
-        steady_mean(&pixels.iter().map(own).collect::<Vec<_>>())
+        steady_mean(pixels.iter().map(own).collect())
     };
     let paths = count * f64::from(2 * PATHS);
     let spent = |of: &dyn Fn(&Pixel) -> TraceStats| {
         cost(&pixels.iter().map(of).fold(TraceStats::default(), TraceStats::plus)) / paths
     };
     let mut findings = Findings {
-        variance: steady_mean(
-            &pixels.iter().map(|pixel| pixel.halves.squared_error(grey)).collect::<Vec<_>>(),
-        ),
         cost: spent(&|pixel| TraceStats {
             rays: pixel.own.rays - pixel.own.shadow_rays,
             ..TraceStats::default()
@@ -136,7 +152,7 @@ fn traced(integrator: &Integrator, pixels: u32, tried: [Range<usize>; Knobs::KIN
 }
 
 /// The mean, in which none of the numbers counts for more than a share of all of them.
-fn steady_mean(numbers: &[f64]) -> f64 {
+fn steady_mean(numbers: Vec<f64>) -> f64 {
     let most = LARGEST_SHARE * numbers.iter().sum::<f64>();
     numbers.iter().map(|number| number.min(most)).sum::<f64>() / numbers.len() as f64
 }

@@ -17,8 +17,10 @@ const FAN: usize = 8;
 const LEAF: u32 = 1 << 31;
 /// No child, no primitive.
 pub const NONE: u32 = u32::MAX;
+/// Stack entries that a walk always clears, so few that this takes no time: enough for a tree 6 nodes deep.
+const SHALLOW: usize = 48;
 /// Stack entries kept out of the heap: enough for a tree 22 nodes deep.
-const SHALLOW: usize = 160;
+const DEEP: usize = 160;
 /// `1 + 2 gamma(3)`: what rounding can take from the distance at which a ray leaves a box.
 const FAR_SLACK: f32 = 1.000_000_5;
 
@@ -83,11 +85,18 @@ impl WideBvh {
         if self.nodes.is_empty() {
             return;
         }
-        if self.stack <= SHALLOW {
-            self.walk_on::<ORDERED>(ray, tmax, &mut [(0, 0.0); SHALLOW], visit);
+        let (mut shallow, mut deep, mut deeper);
+        let stack: &mut [(u32, f32)] = if self.stack <= SHALLOW {
+            shallow = [(0, 0.0); SHALLOW];
+            &mut shallow
+        } else if self.stack <= DEEP {
+            deep = [(0, 0.0); DEEP];
+            &mut deep
         } else {
-            self.walk_on::<ORDERED>(ray, tmax, &mut vec![(0, 0.0); self.stack], visit);
-        }
+            deeper = vec![(0, 0.0); self.stack];
+            &mut deeper
+        };
+        self.walk_on::<ORDERED>(ray, tmax, stack, visit);
     }
 
     #[inline(always)]
@@ -263,7 +272,7 @@ mod tests {
         };
         let boxes: Vec<_> = (0..60_000).map(nested).collect();
         let (tree, leaves) = WideBvh::build(&boxes, 1);
-        assert!(tree.stack > SHALLOW, "only {} entries", tree.stack);
+        assert!(tree.stack > DEEP, "only {} entries", tree.stack);
         let ray = BoxRay::new(Vec3::splat(-1.0), Vec3::ONE);
         let mut visited = vec![false; leaves.len()];
         tree.walk::<true>(&ray, f32::INFINITY, |leaf| {
