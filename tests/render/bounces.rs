@@ -157,14 +157,15 @@ fn the_last_reflected_ray_is_traced_only_where_it_may_find_light() {
     let radiance_nits = Vec3::ONE;
     let lamps = [
         (LightKind::Point { intensity_cd }, 0),
-        (LightKind::Sphere { radiance_nits, radius: 0.1, shaping: None }, 1),
+        // So small that hardly a ray hits it.
+        (LightKind::Sphere { radiance_nits, radius: 1e-4, shaping: None }, 1),
         (LightKind::Dome { radiance_nits, texture: None }, 1),
     ];
     for (kind, last) in lamps {
         let what = format!("{kind:?}");
         let mut stage = Stage::default();
         room(&mut stage, &lambert(Vec3::splat(0.5)));
-        stage.light(kind, at(DVec3::ZERO));
+        stage.light(kind, at(DVec3::new(0.1, 0.7, 0.2)));
         stage.look(DVec3::new(0.0, 0.0, 0.9), DVec3::ZERO, 0.1);
         let set = stage.set();
         for depth in 1..=2 {

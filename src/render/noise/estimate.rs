@@ -28,11 +28,18 @@ impl Halves {
         (a * self.means[0] + b * self.means[1]) / (a + b).max(1.0)
     }
 
-    /// The squared error of [`luminance`](Self::luminance): a quarter of that between the halves where
-    /// they are equally large. 0 if there is one sample.
+    /// The squared error of [`luminance`](Self::luminance), from how far each half is off it: the whole is off the
+    /// converged picture by as much as one of two equal halves is off the whole. Where one half has seen a lamp and
+    /// the other has not, this is nearer to the truth than the error between the halves. 0 if there is one
+    /// sample.
     pub fn squared_error(&self, grey: Grey) -> f64 {
         let [a, b] = self.counts.map(f64::from);
-        grey.squared_error(self.means[0], self.means[1]) * (a * b / ((a + b) * (a + b)).max(1.0))
+        if a == 0.0 || b == 0.0 {
+            return 0.0;
+        }
+        let whole = self.luminance();
+        let [off_a, off_b] = self.means.map(|mean| grey.squared_error(mean, whole));
+        0.5 * (off_a * (a / b) + off_b * (b / a))
     }
 }
 
