@@ -12,11 +12,12 @@
 
 use super::contributions::{Contributions, shares};
 use super::entrant::Way;
-use crate::light_tree::{LightTree, NoSuchFrame};
+use super::oracle;
+use crate::light_tree::{Cell, Glossy, LightTree, NoSuchFrame, Veil, Veils, WIDTH};
 use crate::math::random::{Sampler, hash};
 use crate::render::noise::Grey;
 use crate::render::path::{Integrator, Vertex};
-use crate::render::picker::{LightPicker, PickScratch, Wanted};
+use crate::render::picker::{LightPicker, PickScratch, Site, Wanted};
 use crate::render::{LightStrategy, RenderDelegate, RenderSettings};
 use rayon::prelude::*;
 use serde::Serialize;
@@ -35,6 +36,9 @@ pub struct ProbeOptions {
     pub grey: Option<Grey>,
     /// The seed that chooses the points.
     pub seed: u32,
+    /// Measure the ways of the tree again, with so many clusters weighed by how much of them is
+    /// exactly seen. With `visibility`.
+    pub oracles: Vec<u32>,
 }
 
 /// What was measured.
@@ -80,6 +84,8 @@ struct Probe {
     wanted: Wanted,
     contributions: Contributions,
     sum: f64,
+    /// The same without shadows, for oracles.
+    all: Option<Contributions>,
 }
 
 /// Measures ways of picking lights at points that paths from the delegate's camera visit in a frame.
@@ -96,20 +102,57 @@ pub fn at_probes(
 }
 
 fn report(integrator: &Integrator, options: &ProbeOptions) -> ProbeReport {
-    let probes: Vec<Probe> =
+    let mut probes: Vec<Probe> =
         (0..options.probes).into_par_iter().filter_map(|i| probe(integrator, i, options)).collect();
     let grey = options.grey.unwrap_or_else(|| Grey::of(probes.iter().map(|probe| probe.sum)));
-    let strategies = options.ways.iter().map(|way| {
-        let Way { strategy, split, split_by } = *way;
-        let settings = RenderSettings { strategy, split, split_by, ..integrator.settings.clone() };
-        of_way(integrator, way, &settings, grey, &probes)
-    });
+    let of_all = |veils: Option<Veils>, told: &str, ways: &[Way], probes: &[Probe]| {
+        let of = |way: &Way| {
+            let Way { strategy, split, split_by } = *way;
+            let settings =
+                RenderSettings { strategy, split, split_by, ..integrator.settings.clone() };
+            let tree = integrator.picker.tree().clone();
+            let tree = veils.map_or(tree.clone(), |veils| tree.veiled(veils));
+            let picker = LightPicker::new(&settings, tree, integrator.infinite);
+            StrategyReport { name: format!("{way}{told}"), ..of_way(way, &picker, &settings, grey, probes) }
+        };
+        ways.iter().map(of).collect::<Vec<_>>()
+    };
+    let mut strategies = of_all(None, "", &options.ways, &probes);
+    let walking: Vec<Way> =
+        options.ways.iter().filter(|way| way.strategy.splits()).copied().collect();
+    for &clusters in &options.oracles {
+        let known: Vec<(Vec<Veil>, Vec<u8>)> = probes
+            .par_iter()
+            .map(|probe| {
+                let (Site::At(receiver) | Site::Glossy(Glossy { receiver, .. })) = probe.wanted.site
+                else {
+                    return Default::default();
+                };
+                let all = probe.all.as_ref().unwrap_or(&probe.contributions);
+                let tree = integrator.picker.tree();
+                oracle::veils(tree, &receiver, clusters, (&probe.contributions, all))
+            })
+            .collect();
+        let each = known.iter().map(|(rows, _)| rows.len()).max().unwrap_or(0);
+        let mut rows = Vec::new();
+        for (own, _) in &known {
+            rows.extend_from_slice(own);
+            let none = Veil { group: u32::MAX, weights: [255; WIDTH] };
+            rows.extend(std::iter::repeat_n(none, each - own.len()));
+        }
+        let beside: Vec<u8> = known.iter().flat_map(|(_, beside)| beside).copied().collect();
+        for (probe, cell) in probes.iter_mut().zip(0..) {
+            probe.wanted.cell = Cell(cell);
+        }
+        let veils = Veils::new(probes.len(), &rows, &beside);
+        strategies.extend(of_all(Some(veils), &format!(", oracle {clusters}"), &walking, &probes));
+    }
     ProbeReport {
         probes: probes.len(),
         lights: integrator.picker.tree().unforced_count() as usize
             + integrator.infinite.iter().filter(|light| !light.forced).count(),
         grey,
-        strategies: strategies.collect(),
+        strategies,
     }
 }
 
@@ -130,22 +173,22 @@ fn probe(integrator: &Integrator, number: u32, options: &ProbeOptions) -> Option
     let contributions = Contributions::at(integrator, &vertex, options.visibility);
     let sum = contributions.sum();
     let wanted = vertex.wanted(Some(&mut Sampler::new(seed, 1)));
-    (sum > 0.0).then_some(Probe { wanted, contributions, sum })
+    let is_asked = !options.oracles.is_empty();
+    let all = is_asked.then(|| Contributions::at(integrator, &vertex, false));
+    (sum > 0.0).then_some(Probe { wanted, contributions, sum, all })
 }
 
 fn of_way(
-    integrator: &Integrator,
     way: &Way,
+    picker: &LightPicker,
     settings: &RenderSettings,
     grey: Grey,
     probes: &[Probe],
 ) -> StrategyReport {
-    let tree = integrator.picker.tree().clone();
-    let picker = LightPicker::new(settings, tree, integrator.infinite);
     let rows: Vec<(f64, f64)> = probes
         .par_iter()
         .map(|probe| {
-            let (variance, lights) = of_probe(&picker, settings.strategy, probe);
+            let (variance, lights) = of_probe(picker, settings.strategy, probe);
             (grey.of_deviation(variance, probe.sum), lights)
         })
         .collect();
@@ -166,7 +209,7 @@ fn of_way(
         ninth_decile: quantile(0.9),
         lights: mean(|row| row.1),
         most_lights: rows.iter().map(|row| row.1).fold(0.0, f64::max),
-        nanoseconds: nanoseconds(&picker, probes),
+        nanoseconds: nanoseconds(picker, probes),
     }
 }
 

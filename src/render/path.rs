@@ -12,12 +12,12 @@ use super::direct::power_heuristic;
 use super::fog::Fog;
 use super::knob::Trial;
 use super::light_groups::LightGroups;
-use super::picker::{LightPicker, PickScratch, Wanted};
+use super::picker::{LightPicker, PickScratch, Site, Wanted};
 use super::rays::{Anchor, Hit, HitSurface, Seen, SeenLight, Sender, Tracer};
 use super::settings::RenderSettings;
 use super::surface::Surfaces;
 use crate::emitter::{EmitterHit, InfiniteLight, PosedEmitters};
-use crate::light_tree::{Glossy, Lobes, Picked, Receiver, Splitting};
+use crate::light_tree::{Cell, Glossy, Lobes, Picked, Receiver, Splitting};
 use crate::math::built_in;
 use crate::math::color::Rgb;
 use crate::math::random::{Sampler, hash};
@@ -286,7 +286,7 @@ impl Integrator<'_> {
     fn wanted(&self, vertex: &Vertex, sampler: &mut Sampler) -> Wanted {
         match self.picker.looks() {
             true => vertex.wanted(self.picker.asks_for_direction().then_some(sampler)),
-            false => Wanted::At(vertex.receiver),
+            false => Wanted { site: Site::At(vertex.receiver), cell: Cell::NONE },
         }
     }
 
@@ -402,7 +402,7 @@ impl Vertex {
         let is_glossy =
             |lobes: &Lobes| built_in::GLOSSY && lobes.at_normal + lobes.toward_grazing > 0.0;
         let Some(lobes) = self.reflection.lobes().filter(is_glossy) else {
-            return Wanted::At(receiver);
+            return Wanted { site: Site::At(receiver), cell: Cell::NONE };
         };
         // Independent of the direction in which the path continues: that one may hit a light, whose
         // weight must not depend on the direction.
@@ -411,7 +411,8 @@ impl Vertex {
             self.reflection.sample(lobe, Vec2::new(u, v))
         });
         let toward = drawn.map_or(receiver.normal, |sample| sample.wi);
-        Wanted::Glossy(Glossy { receiver, to_eye: self.wo, lobes, toward })
+        let glossy = Glossy { receiver, to_eye: self.wo, lobes, toward };
+        Wanted { site: Site::Glossy(glossy), cell: Cell::NONE }
     }
 
     /// Whether `wi` is on the same side as `wo` of the geometric surface, and not only of the shading

@@ -80,6 +80,10 @@ pub struct Arguments {
     /// In exact variances, count what cannot be seen from a point as dark: one ray to each emitter
     #[arg(long)]
     visibility: bool,
+    /// With --visibility, measure the tree again with so many clusters weighed by how much of them is exactly
+    /// seen: the most that --learned could give
+    #[arg(long, value_name = "CLUSTERS", value_delimiter = ',', requires = "visibility")]
+    oracle: Vec<u32>,
     /// Other noise, other points
     #[arg(long, default_value_t = 0)]
     pub seed: u32,
@@ -219,6 +223,7 @@ fn measure(arguments: &Arguments, display: &Display) -> Result<Measured> {
             ways: exact_ways(arguments),
             grey: arguments.grey,
             seed,
+            oracles: arguments.oracle.clone(),
         };
         report.exact = Some(at_probes(&delegate, &shot.tree, shot.frame, &options)?);
         if display.is_stopped() {
