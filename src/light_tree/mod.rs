@@ -27,6 +27,7 @@
 //! | `digest` | what a frame samples, in 32 bytes |
 //! | `known` | what has been found out about a file |
 //! | `front` | the groups that matter most to some viewers |
+//! | `learned` | where receivers are, and what they see |
 //! | `veil` | what is known of how much of each cluster is hidden |
 
 mod base;
@@ -38,6 +39,7 @@ mod glossy;
 mod group;
 mod importance;
 mod known;
+pub mod learned;
 mod leaves;
 mod node;
 mod picks;

@@ -13,7 +13,7 @@
 use super::contributions::{Contributions, shares};
 use super::entrant::Way;
 use super::oracle;
-use crate::light_tree::{Cell, Glossy, LightTree, NoSuchFrame, Veil, Veils, WIDTH};
+use crate::light_tree::{Cell, Glossy, LightTree, Moments, NoSuchFrame, Veil, Veils, WIDTH};
 use crate::math::random::{Sampler, hash};
 use crate::render::noise::Grey;
 use crate::render::path::{Integrator, Vertex};
@@ -79,11 +79,16 @@ pub struct StrategyReport {
     pub nanoseconds: f64,
 }
 
+/// So many times a probe is put into a cell, which is random near a border.
+const CELLS_OF_PROBE: u32 = 8;
+
 /// A point, and what all lights give it.
 struct Probe {
     wanted: Wanted,
     contributions: Contributions,
     sum: f64,
+    /// The cells that it may be in, each as often as the others.
+    cells: Vec<Cell>,
     /// The same without shadows, for oracles.
     all: Option<Contributions>,
 }
@@ -120,6 +125,20 @@ fn report(integrator: &Integrator, options: &ProbeOptions) -> ProbeReport {
     let mut strategies = of_all(None, "", &options.ways, &probes);
     let walking: Vec<Way> =
         options.ways.iter().filter(|way| way.strategy.splits()).copied().collect();
+    if let Some(cells) = integrator.cells {
+        for probe in &mut probes {
+            let (Site::At(receiver) | Site::Glossy(Glossy { receiver, .. })) = probe.wanted.site
+            else {
+                continue;
+            };
+            let cell = |u: u32| {
+                let u = (u as f32 + 0.5) / CELLS_OF_PROBE as f32;
+                cells.find(receiver.point, receiver.normal, u)
+            };
+            probe.cells = (0..CELLS_OF_PROBE).map(cell).collect();
+        }
+        strategies.extend(of_all(None, ", learned", &walking, &probes));
+    }
     for &clusters in &options.oracles {
         let known: Vec<(Vec<Veil>, Vec<u8>)> = probes
             .par_iter()
@@ -142,7 +161,7 @@ fn report(integrator: &Integrator, options: &ProbeOptions) -> ProbeReport {
         }
         let beside: Vec<u8> = known.iter().flat_map(|(_, beside)| beside).copied().collect();
         for (probe, cell) in probes.iter_mut().zip(0..) {
-            probe.wanted.cell = Cell(cell);
+            probe.cells = vec![Cell(cell)];
         }
         let veils = Veils::new(probes.len(), &rows, &beside);
         strategies.extend(of_all(Some(veils), &format!(", oracle {clusters}"), &walking, &probes));
@@ -175,7 +194,7 @@ fn probe(integrator: &Integrator, number: u32, options: &ProbeOptions) -> Option
     let wanted = vertex.wanted(Some(&mut Sampler::new(seed, 1)));
     let is_asked = !options.oracles.is_empty();
     let all = is_asked.then(|| Contributions::at(integrator, &vertex, false));
-    (sum > 0.0).then_some(Probe { wanted, contributions, sum, all })
+    (sum > 0.0).then_some(Probe { wanted, contributions, sum, cells: vec![Cell::NONE], all })
 }
 
 fn of_way(
@@ -219,10 +238,15 @@ fn of_probe(picker: &LightPicker, strategy: LightStrategy, probe: &Probe) -> (f6
     match strategy {
         LightStrategy::All => (0.0, f64::from(picker.count())),
         LightStrategy::Tree | LightStrategy::Distance => {
-            let moments = picker.moments(wanted, picker.splitting(0), &|light, expected| {
-                probe.contributions.of(light, expected)
-            });
-            (moments.variance, moments.lights)
+            let of_cell = |&cell: &Cell| {
+                let wanted = Wanted { cell, ..*wanted };
+                picker.moments(&wanted, picker.splitting(0), &|light, expected| {
+                    probe.contributions.of(light, expected)
+                })
+            };
+            let all: Vec<Moments> = probe.cells.iter().map(of_cell).collect();
+            let mean = |of: fn(&Moments) -> f64| all.iter().map(of).sum::<f64>() / all.len() as f64;
+            (mean(|moments| moments.variance), mean(|moments| moments.lights))
         }
         LightStrategy::Exhaustive => {
             let mut importances = Vec::new();
@@ -250,7 +274,8 @@ fn nanoseconds(picker: &LightPicker, probes: &[Probe]) -> f64 {
             let mut picked = 0u32;
             for (number, probe) in (0..).zip(probes) {
                 let u = (hash(round, number) >> 8) as f32 / 16_777_216.0;
-                picker.pick(&probe.wanted, picker.splitting(0), (u, number), &mut scratch, |_| {
+                let wanted = Wanted { cell: probe.cells[0], ..probe.wanted };
+                picker.pick(&wanted, picker.splitting(0), (u, number), &mut scratch, |_| {
                     picked += 1
                 });
             }

@@ -212,6 +212,16 @@ fn measure(arguments: &Arguments, display: &Display) -> Result<Measured> {
     let mut report = Report::new(scene, shot.frame, machine, base.clone());
     let mut delegate =
         RenderDelegate::new(&shot.scene, &shot.emitters, shot.camera.clone(), base.clone());
+    let table;
+    if let Ok(text) = std::env::var("LEARN") {
+        let n: Vec<u64> = text.split(',').map(|n| n.parse().unwrap()).collect();
+        let options = candelabra::learn::LearnOptions { levels: n[0] as u32, groups: n[1] as usize, rays: n[2] };
+        let started = std::time::Instant::now();
+        table = candelabra::learn::learn::<candelabra::light_tree::NoSuchFrame>(
+            &delegate, &[shot.frame], |_, work| work(&shot.tree.by_reference()), &options)?;
+        say(format_args!("learned in {:?}; {} rows", started.elapsed(), table.rows.len()));
+        delegate.set_learned(Some(table.view()));
+    }
     report.lights = delegate.at_frame(&shot.tree, shot.frame, |integrator| {
         integrator.emitters.emitters.len() + integrator.infinite.len()
     })?;
