@@ -10,17 +10,20 @@
 //! Counts are whole numbers and weights change between rounds only, so the table does not depend on threads.
 
 mod counts;
+mod pool;
 
-use crate::light_tree::learned::{Coordinates, Table, coordinates, divide};
-use crate::light_tree::{Picked, Receiver, Splitting};
-use crate::light_tree::{LightTree, NoSuchFrame};
+use crate::light_tree::learned::{Cells, Coordinates, Table, coordinates, divide};
+use crate::light_tree::veil::encode;
+use crate::light_tree::{LightTree, NoSuchFrame, Picked, Receiver, Splitting, Veil, WIDTH};
 use crate::math::random::hash;
 use crate::render::RenderDelegate;
 use crate::render::path::{Integrator, Vertex};
 use crate::render::picker::{PickScratch, Wanted};
 use counts::Counts;
 use glam::{Vec2, Vec3};
+use pool::{Known, pool};
 use rayon::prelude::*;
+use std::sync::{Mutex, PoisonError};
 
 /// How much is learned.
 #[derive(Clone, Copy, Debug)]
@@ -33,14 +36,32 @@ pub struct LearnOptions {
     pub rays: u64,
 }
 
-impl Default for LearnOptions {
-    fn default() -> LearnOptions {
-        LearnOptions { levels: 12, groups: 16, rays: 1 << 22 }
+impl LearnOptions {
+    /// So many rays, and as many cells as they can tell apart.
+    pub fn of_rays(rays: u64) -> LearnOptions {
+        let levels = (rays / RAYS_OF_CELL).max(1).ilog2().min(MOST_LEVELS);
+        LearnOptions { levels, groups: 16, rays }
     }
 }
 
-/// Rounds, if there are not more frames.
-const ROUNDS: usize = 4;
+/// What was learned.
+#[derive(Clone, Debug)]
+pub struct Lesson {
+    /// The table; without rows if nothing is hidden.
+    pub table: Table,
+    /// Rays to lights.
+    pub rays: u64,
+    /// The share of the first round's rays that did not arrive: what a render picks in vain without a table.
+    pub hidden: f64,
+}
+
+/// Rays that a cell is worth.
+const RAYS_OF_CELL: u64 = 256;
+/// With more levels the table would not be small.
+const MOST_LEVELS: u32 = 16;
+/// Each takes twice as many rays as the one before it, but the second, which takes as many as the first:
+/// what is hidden and bright is found out by few.
+const ROUNDS: u32 = 6;
 /// Receivers that a cell is made for, in the mean.
 const RECEIVERS_OF_CELL: usize = 64;
 /// Receivers of a cell that decide what is looked into.
@@ -48,59 +69,103 @@ const LOOKERS: usize = 8;
 /// Points of a path that are looked at.
 const BOUNCES: u32 = 2;
 /// Rays to lights from each.
-const RAYS: u32 = 4;
+const RAYS: u32 = 8;
+/// If a smaller share of the rays is stopped, there is nothing to learn.
+const NOTHING: f64 = 0.01;
 /// The random numbers are not those of any frame.
 const SEED: u32 = 0x6c65_6172;
 
-/// Learns from some frames. `tree_at` gives the trees of each: that of what stands still must be the same in all.
+/// Work in a frame that is ready to be traced.
+pub type Work<'w> = &'w mut dyn FnMut(&LightTree<&[u8]>) -> Result<(), NoSuchFrame>;
+
+/// Learns from some frames, at least one. `at_frame` calls work with the trees of a frame; that of what
+/// stands still must be the same in all. `go_on` is told how much is done, and says whether to go on.
+/// `None` if it said no.
 ///
 /// # Errors
-/// If a tree lacks its frame.
-pub fn learn<E: From<NoSuchFrame>>(
+/// Those of `at_frame`, which passes on what the work says.
+pub fn learn<E>(
     delegate: &RenderDelegate,
     frames: &[i32],
-    mut at_frame: impl FnMut(i32, &mut dyn FnMut(&LightTree<&[u8]>) -> Result<(), NoSuchFrame>) -> Result<(), E>,
+    mut at_frame: impl FnMut(i32, Work) -> Result<(), E>,
     options: &LearnOptions,
-) -> Result<Table, E> {
+    go_on: &mut dyn FnMut(f64) -> bool,
+) -> Result<Option<Lesson>, E> {
     let LearnOptions { levels, groups, rays } = *options;
-    let cells = 1_usize << levels;
+    let paths = |all: u64| all.div_ceil(frames.len() as u64) as u32;
     let mut receivers: Vec<Coordinates> = Vec::new();
-    let of_frame = (cells * RECEIVERS_OF_CELL / BOUNCES as usize).div_ceil(frames.len().max(1)) as u32;
+    let mut table = Table::default();
+    let of_frame = paths(((RECEIVERS_OF_CELL as u64) << levels) / u64::from(BOUNCES));
     for &frame in frames {
         at_frame(frame, &mut |tree| {
-            delegate.at_frame(tree, frame, |integrator| {
+            table.tree = tree.still_key();
+            delegate.at_frame_knowing(tree, frame, None, |integrator| {
                 receivers.extend(visited(integrator, of_frame, hash(SEED, frame as u32)));
             })
         })?;
     }
     let (planes, ranges) = divide(&mut receivers, levels);
+    table.planes = planes;
     let mut counts: Option<Counts> = None;
-    let mut table = Table { planes, ..Table::default() };
-    let rounds = ROUNDS.next_multiple_of(frames.len().max(1)).min(ROUNDS.max(frames.len()));
-    let paths = rays / u64::from(BOUNCES * RAYS) / rounds as u64;
-    for round in 0..rounds {
-        let frame = frames[round % frames.len()];
-        at_frame(frame, &mut |tree| {
-            let known = table.view();
-            let known = (!table.rows.is_empty()).then_some(known);
-            let counted = delegate.at_frame_knowing(tree, frame, known, |integrator| {
-                let counts = counts.get_or_insert_with(|| {
-                    let lookers = ranges.iter().map(|&[begin, end]| lookers(&receivers[begin..end]));
-                    Counts::new(integrator.picker.tree(), &lookers.collect::<Vec<_>>(), groups, integrator.infinite.len())
-                });
-                let seed = hash(hash(SEED, round as u32 + 1), frame as u32);
-                (0..paths as u32).into_par_iter().for_each_init(PickScratch::default, |scratch, number| {
-                    look(integrator, &table, counts, (number, paths as u32, hash(seed, number)), scratch);
-                });
-            });
-            counted.map(|()| {
-                if let Some(counts) = &counts {
-                    (table.rows, table.beside) = counts.weights();
-                }
-            })
-        })?;
+    let (mut done, mut hidden) = (0, 0.0);
+    for round in 0..ROUNDS {
+        let of_frame = paths((rays >> (ROUNDS - round.max(1))) / u64::from(BOUNCES * RAYS)).max(1);
+        for &frame in frames {
+            if !go_on(done as f64 / rays as f64) {
+                return Ok(None);
+            }
+            at_frame(frame, &mut |tree| {
+                delegate.at_frame_knowing(tree, frame, table.view().as_ref(), |integrator| {
+                    let counts = counts.get_or_insert_with(|| {
+                        let of_cell = |&[begin, end]: &[usize; 2]| lookers(&receivers[begin..end]);
+                        let lookers: Vec<Vec<Receiver>> = ranges.iter().map(of_cell).collect();
+                        let beside = integrator.infinite.len();
+                        Counts::new(integrator.picker.tree(), &lookers, groups, beside)
+                    });
+                    let seed = hash(hash(SEED, round + 1), frame as u32);
+                    let look = |scratch: &mut PickScratch, number: u32| {
+                        let path = (number, of_frame, hash(seed, number));
+                        look(integrator, Cells(&table.planes), counts, path, scratch);
+                    };
+                    (0..of_frame).into_par_iter().for_each_init(PickScratch::default, look);
+                })
+            })?;
+            done += u64::from(of_frame * BOUNCES * RAYS);
+        }
+        let Some(counts) = &counts else { break };
+        if round == 0 {
+            hidden = counts.hidden();
+            if hidden < NOTHING {
+                (table.planes, table.rows) = Default::default();
+                break;
+            }
+        }
+        table.rows = rows(counts, 1 << levels);
     }
-    Ok(table)
+    let rays = counts.map_or(0, |counts| counts.sent());
+    Ok(Some(Lesson { table, rays, hidden }))
+}
+
+/// The veils that counts give.
+fn rows(counts: &Counts, cells: usize) -> Vec<Veil> {
+    let none = Veil { group: u32::MAX, weights: [255; WIDTH] };
+    let found: Vec<Mutex<Vec<Veil>>> = (0..cells).map(|_| Mutex::default()).collect();
+    pool(
+        (0..cells).into_par_iter().map(|cell| counts.tallies(cell)).collect(),
+        &|cell, mut known| {
+            counts.sum_up(cell, &mut known);
+            let veil = |known: &Known| {
+                let weights = known.shares.map(|share| encode(share.sqrt()));
+                Veil { group: known.group, weights }
+            };
+            let mut rows: Vec<Veil> = known.iter().map(veil).collect();
+            rows.resize(counts.groups, none);
+            *found[cell].lock().unwrap_or_else(PoisonError::into_inner) = rows;
+        },
+    );
+    let rows =
+        found.into_iter().map(|rows| rows.into_inner().unwrap_or_else(PoisonError::into_inner));
+    rows.flatten().collect()
 }
 
 /// Receivers that paths of a frame visit.
@@ -137,7 +202,7 @@ fn lookers(of_cell: &[Coordinates]) -> Vec<Receiver> {
 /// Traces a path, picks lights at its points and counts which are seen.
 fn look(
     integrator: &Integrator,
-    table: &Table,
+    cells: Cells,
     counts: &Counts,
     (number, of, seed): (u32, u32, u32),
     scratch: &mut PickScratch,
@@ -149,7 +214,7 @@ fn look(
         bounce += 1;
         let number = |salt: u32| (hash(hash(seed, bounce), salt) >> 8) as f32 / 16_777_216.0;
         let Receiver { point, normal } = vertex.receiver;
-        let cell = table.view().cells.find(point, normal, number(0));
+        let cell = cells.find(point, normal, number(0));
         let wanted = Wanted { cell, ..vertex.wanted(None) };
         for ray in 0..RAYS {
             let u = (ray as f32 + number(1)) / RAYS as f32;

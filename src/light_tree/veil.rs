@@ -31,9 +31,10 @@ pub struct Veil {
 pub struct Veils<'a> {
     rows: &'a [Veil],
     of_each: usize,
-    beside: &'a [u8],
-    beside_each: usize,
 }
+
+/// Lights beside the tree are the lanes of groups with numbers from here on.
+pub const BESIDE: u32 = 1 << 31;
 
 /// A cell, by number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -45,18 +46,16 @@ impl Cell {
 }
 
 impl<'a> Veils<'a> {
-    /// Of `cells` cells, each with the same number of rows and of bytes for lights beside the tree.
-    pub fn new(cells: usize, rows: &'a [Veil], beside: &'a [u8]) -> Veils<'a> {
-        let cells = cells.max(1);
-        Veils { rows, of_each: rows.len() / cells, beside, beside_each: beside.len() / cells }
+    /// Of so many cells, with the same number of rows each.
+    pub fn new(cells: usize, rows: &'a [Veil]) -> Veils<'a> {
+        Veils { rows, of_each: rows.len() / cells.max(1) }
     }
 
-    /// The weight of a light beside the tree in a cell.
+    /// The weight of a light beside the tree in a cell: 1 if nothing is known.
     #[inline]
-    pub fn weight_beside(&self, cell: Cell, row: usize) -> f64 {
-        let first = (cell.0 as usize).saturating_mul(self.beside_each);
-        let byte = self.beside.get(first..).and_then(|rest| rest[..self.beside_each].get(row));
-        byte.map_or(1.0, |&byte| decode(byte).into())
+    pub(super) fn weight_beside(&self, cell: Cell, row: usize) -> f64 {
+        let weights = self.weights(cell, BESIDE + (row / WIDTH) as u32);
+        weights.map_or(1.0, |weights| weights[row % WIDTH].into())
     }
 
     /// The rows of a cell; none if there is no such cell.

@@ -4,17 +4,17 @@
 //! its light that exactly arrives. Nothing that is learned can know more with as many clusters.
 
 use super::contributions::Contributions;
-use crate::light_tree::veil::encode;
+use crate::light_tree::veil::{BESIDE, encode};
 use crate::light_tree::{FrameTree, Picked, Veil, Viewer, WIDTH};
 
-/// The veils of a probe, for so many clusters: of the tree, and beside it. `all` is what it would receive
+/// The veils of a probe, for so many clusters, and for what is beside the tree. `all` is what it would receive
 /// if nothing were in the way.
 pub fn veils<V: Viewer>(
     tree: &FrameTree,
     viewer: &V,
     clusters: u32,
     (seen, all): (&Contributions, &Contributions),
-) -> (Vec<Veil>, Vec<u8>) {
+) -> Vec<Veil> {
     let groups = tree.front(&[*viewer], (clusters as usize).div_ceil(WIDTH)).groups;
     let mut sums = vec![[[0.0; 2]; WIDTH]; groups.len()];
     for emitter in 0..tree.unforced_count() {
@@ -29,7 +29,16 @@ pub fn veils<V: Viewer>(
     let byte = |[seen, all]: [f64; 2]| if all > 0.0 { encode((seen / all).sqrt()) } else { 255 };
     let rows = groups.iter().zip(sums);
     let rows = rows.map(|(row, sums)| Veil { group: row.group, weights: sums.map(byte) });
-    let beside = (0..seen.beside_count() as u32).map(Picked::Beside);
-    let beside = beside.map(|light| byte([seen.luminance(light), all.luminance(light)]));
-    (rows.collect(), beside.collect())
+    let beside = seen.beside_count();
+    let rows_beside = (0..beside.div_ceil(WIDTH)).map(|row| {
+        let of_lane = |lane: usize| match row * WIDTH + lane {
+            at if at < beside => {
+                let light = Picked::Beside(at as u32);
+                byte([seen.luminance(light), all.luminance(light)])
+            }
+            _ => 255,
+        };
+        Veil { group: BESIDE + row as u32, weights: std::array::from_fn(of_lane) }
+    });
+    rows.chain(rows_beside).collect()
 }

@@ -118,7 +118,10 @@ fn report(integrator: &Integrator, options: &ProbeOptions) -> ProbeReport {
             let tree = integrator.picker.tree().clone();
             let tree = veils.map_or(tree.clone(), |veils| tree.veiled(veils));
             let picker = LightPicker::new(&settings, tree, integrator.infinite);
-            StrategyReport { name: format!("{way}{told}"), ..of_way(way, &picker, &settings, grey, probes) }
+            StrategyReport {
+                name: format!("{way}{told}"),
+                ..of_way(way, &picker, &settings, grey, probes)
+            }
         };
         ways.iter().map(of).collect::<Vec<_>>()
     };
@@ -140,10 +143,11 @@ fn report(integrator: &Integrator, options: &ProbeOptions) -> ProbeReport {
         strategies.extend(of_all(None, ", learned", &walking, &probes));
     }
     for &clusters in &options.oracles {
-        let known: Vec<(Vec<Veil>, Vec<u8>)> = probes
+        let known: Vec<Vec<Veil>> = probes
             .par_iter()
             .map(|probe| {
-                let (Site::At(receiver) | Site::Glossy(Glossy { receiver, .. })) = probe.wanted.site
+                let (Site::At(receiver) | Site::Glossy(Glossy { receiver, .. })) =
+                    probe.wanted.site
                 else {
                     return Default::default();
                 };
@@ -152,18 +156,17 @@ fn report(integrator: &Integrator, options: &ProbeOptions) -> ProbeReport {
                 oracle::veils(tree, &receiver, clusters, (&probe.contributions, all))
             })
             .collect();
-        let each = known.iter().map(|(rows, _)| rows.len()).max().unwrap_or(0);
+        let each = known.iter().map(Vec::len).max().unwrap_or(0);
         let mut rows = Vec::new();
-        for (own, _) in &known {
+        for own in &known {
             rows.extend_from_slice(own);
             let none = Veil { group: u32::MAX, weights: [255; WIDTH] };
             rows.extend(std::iter::repeat_n(none, each - own.len()));
         }
-        let beside: Vec<u8> = known.iter().flat_map(|(_, beside)| beside).copied().collect();
         for (probe, cell) in probes.iter_mut().zip(0..) {
             probe.cells = vec![Cell(cell)];
         }
-        let veils = Veils::new(probes.len(), &rows, &beside);
+        let veils = Veils::new(probes.len(), &rows);
         strategies.extend(of_all(Some(veils), &format!(", oracle {clusters}"), &walking, &probes));
     }
     ProbeReport {
@@ -275,9 +278,8 @@ fn nanoseconds(picker: &LightPicker, probes: &[Probe]) -> f64 {
             for (number, probe) in (0..).zip(probes) {
                 let u = (hash(round, number) >> 8) as f32 / 16_777_216.0;
                 let wanted = Wanted { cell: probe.cells[0], ..probe.wanted };
-                picker.pick(&wanted, picker.splitting(0), (u, number), &mut scratch, |_| {
-                    picked += 1
-                });
+                picker
+                    .pick(&wanted, picker.splitting(0), (u, number), &mut scratch, |_| picked += 1);
             }
             std::hint::black_box(picked);
             started.elapsed().as_nanos() as f64 / probes.len().max(1) as f64

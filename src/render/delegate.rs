@@ -90,7 +90,7 @@ impl<'a> RenderDelegate<'a> {
         }
     }
 
-    /// Weighs lights by what has been learned of the shot from now on. It must belong to the tree.
+    /// Weighs lights by what has been learned of the shot from now on, wherever that belongs to the tree.
     pub fn set_learned(&mut self, learned: Option<Learned<'a>>) {
         self.learned = learned;
     }
@@ -115,7 +115,7 @@ impl<'a> RenderDelegate<'a> {
         frame: i32,
         work: impl FnOnce(&Integrator) -> T,
     ) -> Result<T, NoSuchFrame> {
-        self.at_frame_knowing(tree, frame, self.learned, work)
+        self.at_frame_knowing(tree, frame, self.learned.as_ref(), work)
     }
 
     /// The same, with what has been learned so far.
@@ -129,16 +129,18 @@ impl<'a> RenderDelegate<'a> {
         &self,
         tree: &LightTree<impl AsRef<[u8]>>,
         frame: i32,
-        learned: Option<Learned>,
+        learned: Option<&Learned>,
         work: impl FnOnce(&Integrator) -> T,
     ) -> Result<T, NoSuchFrame> {
         let pose = self.scene.pose_at(self.scene.timeline.seconds_at(f64::from(frame)));
         let infinite = self.skies.lights(self.scene, &pose);
         assert_eq!(tree.emitter_count(), self.emitters.len(), "the tree belongs to another scene");
-        let mut tree = tree.at_frame(frame)?;
-        if let Some(learned) = learned {
-            tree = tree.veiled(learned.veils);
-        }
+        let learned = learned.filter(|learned| learned.tree == tree.still_key());
+        let tree = tree.at_frame(frame)?;
+        let tree = match learned {
+            Some(learned) => tree.veiled(learned.veils),
+            None => tree,
+        };
         let (width, height) = (self.settings.width, self.settings.height);
         Ok(work(&Integrator {
             settings: &self.settings,

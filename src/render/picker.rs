@@ -8,8 +8,8 @@ use super::knob::Knobs;
 use super::settings::{LightStrategy, RenderSettings};
 use crate::emitter::InfiniteLight;
 use crate::light_tree::{
-    Cell, DistanceOnly, FrameTree, Glossy, Moments, Pick, Picked, Receiver, Scratch, Segment, SplitTest,
-    Splitting, Veiled, Viewer,
+    Cell, DistanceOnly, FrameTree, Glossy, Moments, Pick, Picked, Receiver, Scratch, Segment,
+    SplitTest, Splitting, Veiled, Viewer,
 };
 use crate::math::built_in;
 use crate::math::random::{hash, widen};

@@ -34,7 +34,7 @@ pub struct Cells<'a>(pub &'a [Plane]);
 /// A normal all the way round counts as much as this share of the receivers' extent.
 const TURN: f32 = 0.1;
 /// The width of a plane's band as a share of that of the cells beside it.
-const BAND: f32 = 0.5;
+const BAND: f32 = 0.25;
 
 impl Cells<'_> {
     /// How many cells there are.
@@ -92,7 +92,8 @@ pub fn divide(receivers: &mut [Coordinates], levels: u32) -> (Vec<Plane>, Vec<[u
         let mut beside = Vec::new();
         add_beside(&planes, (2 * node + 1, 1), axis, &mut beside);
         add_beside(&planes, (2 * node + 2, 0), axis, &mut beside);
-        let known = beside.iter().map(|&cell| sizes[cell][axis as usize]).filter(|&size| size > 0.0);
+        let known =
+            beside.iter().map(|&cell| sizes[cell][axis as usize]).filter(|&size| size > 0.0);
         let (count, sum) = known.fold((0, 0.0), |(count, sum), size| (count + 1, sum + size));
         planes[node].width = if count > 0 { BAND * sum / count as f32 } else { 0.0 };
     }
