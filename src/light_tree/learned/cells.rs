@@ -34,7 +34,7 @@ pub struct Cells<'a>(pub &'a [Plane]);
 /// A normal all the way round counts as much as this share of the receivers' extent.
 const TURN: f32 = 0.1;
 /// The width of a plane's band as a share of that of the cells beside it.
-const BAND: f32 = 0.25;
+const BAND: f32 = 0.5;
 
 impl Cells<'_> {
     /// How many cells there are.
