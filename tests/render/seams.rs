@@ -73,26 +73,21 @@ fn variance_changes_smoothly_where_the_seed_has_seams() {
     assert!(largest_jump(&graded) < 1.15);
 }
 
-/// Two cells that differ: in one of them half of the lights are taken for half hidden. The band is that of
-/// cells which are a metre and a half wide.
+/// Two cells, one of which takes half of the lights for half hidden. The band is that of cells which are a
+/// metre and a half wide.
 #[test]
 fn cells_have_no_seams() {
     let table = |width: f32| {
         move |set: &Set| {
-            let groups = 0..set.tree.groups().len() as u32;
             let row =
-                |group, byte| Veil { group, weights: [255, byte, 255, byte, 255, byte, 255, byte] };
-            let rows = groups
-                .clone()
-                .map(|group| row(group, 255))
-                .chain(groups.map(|group| row(group, 80)));
+                |byte| Veil { group: 0, weights: [255, byte, 255, byte, 255, byte, 255, byte] };
             let planes = vec![Plane { at: 0.8, width, axis: 0 }];
-            Table { tree: set.tree.still_key(), planes, rows: rows.collect() }
+            Table { tree: set.tree.still_key(), planes, rows: vec![row(255), row(215)] }
         }
     };
-    let sharp = profile(Way::split(0.1), table(0.0));
-    let soft = profile(Way::split(0.1), table(0.75));
-    println!("sharp {:.2}, soft {:.2}", largest_jump(&sharp), largest_jump(&soft));
-    assert!(largest_jump(&sharp) > 1.3, "the cells do not differ: {:.2}", largest_jump(&sharp));
-    assert!(largest_jump(&soft) < 1.15, "{:.2}", largest_jump(&soft));
+    let [sharp, soft] =
+        [0.0, 0.75].map(|width| largest_jump(&profile(Way::split(0.1), table(width))));
+    println!("sharp {sharp:.2}, soft {soft:.2}");
+    assert!(sharp > 1.2, "the cells do not differ: {sharp:.2}");
+    assert!(soft - 1.0 < 0.5 * (sharp - 1.0), "{soft:.2} of {sharp:.2}");
 }
