@@ -16,7 +16,7 @@
 //! | 7 | `bin/candelabra`, `bin/candelabra-render` | arguments, progress, exit codes |
 //! | 6 | [`diff`], [`farm`], [`inspect`] | two versions of a scene; jobs of many frames; one scene |
 //! | 5 | [`pipeline`] | jobs and stages: the only place where ingest meets the tree |
-//! | 4 | [`measure`] | strategies side by side: exact variance, error against time |
+//! | 4 | [`learn`], [`measure`] | what is hidden from where; strategies side by side: variance, error against time |
 //! | 3 | [`render`] | a path tracer that finds its lights through the tree |
 //! | 2 | [`ingest`], [`emitter`], [`light_tree`] | files to scene; scene to emitters; bounds to tree |
 //! | 1 | [`scene`], [`bounds`], [`store`], [`page`] | a scene's tables; box, cone, energy; bytes on disk; HTML |
@@ -61,6 +61,7 @@ pub mod emitter;
 pub mod farm;
 pub mod ingest;
 pub mod inspect;
+pub mod learn;
 pub mod light_tree;
 pub mod math;
 pub mod measure;

@@ -10,7 +10,7 @@ const FLOORS: [&[&str]; 8] = [
     &["scene", "bounds", "store", "page"],
     &["ingest", "emitter", "light_tree"],
     &["render"],
-    &["measure"],
+    &["learn", "measure"],
     &["pipeline"],
     &["diff", "farm", "inspect"],
     &["bin"],

@@ -13,6 +13,7 @@ from functools import partial
 from pathlib import Path
 
 import fog_spots
+import hidden
 import lamps
 import million_points
 import spiral_mesh
@@ -29,6 +30,8 @@ SCENES = {
     "lamps_1000": partial(lamps.write, lights=1000),
     "fog_spots": fog_spots.write,
     "textured_lights": textured_lights.write,
+    "two_rooms": hidden.write_rooms,
+    "behind_house": hidden.write_house,
 }
 GLTF = {"million_points", "one_area", "textured_lights"}
 EXPORTER = Path(__file__).resolve().parents[2] / "scripts" / "usd_to_gltf.py"

@@ -131,6 +131,9 @@ impl FrameTree<'_> {
             let leg = route.map(|_| 0);
             if how.is_off() {
                 wanted = leg.map(|leg| (scratch.entries.len(), leg));
+                // What is hidden is known of the root's children, not of the root.
+                let known = self.weigh(&place).filter(|weighed| weighed.veils.is_some());
+                let weight = known.map_or(weight, |weighed| weighed.importances.iter().sum());
                 scratch.push(Entry::Cluster(place), weight, 1.0);
             } else {
                 scratch.open.push(Opened { place, leg, weight, opened: 1.0, cap: 1.0 });
@@ -165,7 +168,7 @@ impl FrameTree<'_> {
         // The sum of everything's importance; the root's children know it better than the root.
         let mut total = None;
         while let Some(Opened { place, leg, weight, opened, cap }) = scratch.open.pop() {
-            let Some(Weighed { group, importances, spreads }) = self.weigh(&place) else {
+            let Some(Weighed { group, importances, spreads, veils }) = self.weigh(&place) else {
                 continue;
             };
             scratch.weighed += 1;
@@ -190,7 +193,8 @@ impl FrameTree<'_> {
                 let entry = match self.follow(&place, group, lane) {
                     None => continue,
                     Some(Next::Emitter(emitter)) => Entry::Light(Picked::Emitter(emitter)),
-                    Some(Next::Group(below)) => {
+                    Some(Next::Group(mut below)) => {
+                        below.veil = veils.map_or(1.0, |veils| veils[lane]);
                         let part = weight * f64::from(spreads[lane]);
                         let excess = match how.test {
                             _ if how.is_full() => 1.0,

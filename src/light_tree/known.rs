@@ -12,6 +12,8 @@ pub(super) struct Known {
     pub rows: OnceLock<()>,
     /// Where the leaves are that frames share.
     pub leaves: OnceLock<LeafTable>,
+    /// What a table of what is seen belongs to.
+    pub still_key: OnceLock<[u8; 32]>,
     trees: OnceLock<Box<[OfTree]>>,
 }
 

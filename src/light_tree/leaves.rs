@@ -149,6 +149,11 @@ pub(super) fn find_placed(placed: &[Placed], emitter: u32) -> Option<Placed> {
 }
 
 impl LeafTable {
+    /// The slot in the tree of what stands still of an emitter, or of what it is placed with.
+    pub(super) fn in_still(&self, emitter: u32) -> Option<Slot> {
+        self.still.find(emitter).map(|(slot, _)| slot)
+    }
+
     /// The slot of an emitter in its shared tree.
     pub(super) fn in_shared(
         &self,

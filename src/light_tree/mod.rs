@@ -26,15 +26,20 @@
 //! | `verify` | proof that a file, or what a frame samples of it, keeps the format's promises |
 //! | `digest` | what a frame samples, in 32 bytes |
 //! | `known` | what has been found out about a file |
+//! | `front` | the groups that matter most to some viewers |
+//! | `learned` | where receivers are, and what they see |
+//! | `veil` | what is known of how much of each cluster is hidden |
 
 mod base;
 mod builder;
 mod cut;
 mod digest;
+mod front;
 mod glossy;
 mod group;
 mod importance;
 mod known;
+pub mod learned;
 mod leaves;
 mod node;
 mod picks;
@@ -46,6 +51,7 @@ mod segment;
 mod splitting;
 mod tree;
 mod variance;
+pub mod veil;
 mod verify;
 mod viewer;
 mod wide;
@@ -54,6 +60,7 @@ mod writer;
 pub use base::Base;
 pub use builder::ALGORITHM_VERSION;
 pub use cut::{Picked, Scratch};
+pub use front::{Front, FrontGroup};
 pub use glossy::{Glossy, Lobes};
 pub use group::{Group, WIDTH};
 pub use node::{Link, Node};
@@ -65,6 +72,7 @@ pub use segment::Segment;
 pub use splitting::{SplitTest, Splitting};
 pub use tree::{LightTree, NoSuchFrame};
 pub use variance::Moments;
+pub use veil::{Cell, Veil, Veiled, Veils};
 pub use verify::rules::RULES;
 pub use viewer::{DistanceOnly, Receiver, Viewer};
 pub use writer::{LightList, LightSummary, LightTreeWriter};

@@ -12,6 +12,7 @@ use super::group::{Group, WIDTH};
 use super::node::Link;
 use super::sampling::FrameTree;
 use super::splitting::BELOW_ONE;
+use super::veil::Cell;
 use super::viewer::Viewer;
 use crate::math::built_in;
 
@@ -25,7 +26,9 @@ pub(super) struct Place<V> {
     /// The tree's emitters are numbered from here on.
     pub first_emitter: u32,
     /// What an importance in this space is worth in world space.
-    unit: f64,
+    pub unit: f64,
+    /// The weight of a lane of which no more is known: that of the last one on the way of which more is.
+    pub veil: f32,
     pub viewer: V,
 }
 
@@ -42,6 +45,8 @@ pub(super) struct Weighed<'a> {
     pub importances: [f64; WIDTH],
     /// How uncertain each is: the squared relative deviation of what its emitters send.
     pub spreads: [f32; WIDTH],
+    /// The weight of what is known to be hidden, which the two contain; if anything is known.
+    pub veils: Option<[f32; WIDTH]>,
 }
 
 impl FrameTree<'_> {
@@ -54,13 +59,25 @@ impl FrameTree<'_> {
         if built_in::INSTANCES {
             importances.iter_mut().for_each(|importance| *importance *= place.unit);
         }
-        Some(Weighed { group, importances, spreads })
+        let veils = self.veils.filter(|_| place.viewer.cell() != Cell::NONE).map(|veils| {
+            let weights = veils.weights(place.viewer.cell(), place.at);
+            let weights = weights.unwrap_or([place.veil; WIDTH]);
+            for (lane, weight) in weights.into_iter().enumerate() {
+                importances[lane] *= f64::from(weight);
+            }
+            weights
+        });
+        Some(Weighed { group, importances, spreads, veils })
     }
 
     pub(super) fn place_of_root<V: Viewer>(&self, viewer: &V) -> Option<Place<V>> {
-        let row = self.root?;
-        let at = self.trees[row as usize].first_group;
-        Some(Place { row, at, first_emitter: 0, unit: 1.0, viewer: *viewer })
+        self.place_in(self.root?, viewer)
+    }
+
+    /// The root of a tree in world space.
+    pub(super) fn place_in<V: Viewer>(&self, row: u32, viewer: &V) -> Option<Place<V>> {
+        let at = self.trees.get(row as usize)?.first_group;
+        Some(Place { row, at, first_emitter: 0, unit: 1.0, veil: 1.0, viewer: *viewer })
     }
 
     /// The root of a forced light. No importance there is ever compared with one elsewhere, so its
@@ -73,6 +90,7 @@ impl FrameTree<'_> {
             at: tree.first_group,
             first_emitter: instance.first_emitter,
             unit: 1.0,
+            veil: 1.0,
             viewer: viewer.within(&instance.to_local),
         })
     }
@@ -128,6 +146,7 @@ impl FrameTree<'_> {
             at: tree.first_group,
             first_emitter: instance.first_emitter,
             unit,
+            veil: from.veil,
             viewer,
         })
     }

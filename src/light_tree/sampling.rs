@@ -12,6 +12,7 @@ use super::node::{Link, Node};
 use super::place::{Next, Place, Weighed};
 use super::records::{InstanceRow, LightRow, TreeRow};
 use super::tree::{LightTree, NoSuchFrame};
+use super::veil::{Cell, Veils};
 use super::viewer::Viewer;
 use crate::math::built_in;
 
@@ -39,12 +40,16 @@ pub struct FrameTree<'a> {
     pub(super) trees: &'a [TreeRow],
     pub(super) instances: &'a [InstanceRow],
     pub(super) root: Option<u32>,
+    /// The tree of what stands still.
+    pub(super) still: Option<u32>,
     pub(super) table: &'a LeafTable,
     /// The leaves of the frame's own tree, if things change.
     pub(super) own: Option<Leaves>,
     /// Forced lights, in the order of their emitters.
     pub(super) forced: Vec<Placed>,
     pub(super) emitter_count: u32,
+    /// What is known to be hidden.
+    pub(super) veils: Option<Veils<'a>>,
     /// The first emitter of a forced light, if there is one.
     unforced_count: u32,
 }
@@ -70,12 +75,27 @@ impl<D: AsRef<[u8]>> LightTree<D> {
             trees: self.trees(),
             instances: self.instances(),
             root,
+            still: self.still_tree(),
             table: self.leaf_table(),
             own,
             forced: forced.collect(),
             emitter_count: self.emitter_count() as u32,
+            veils: None,
             unforced_count: self.first_of_class(LightRow::FORCED),
         })
+    }
+}
+
+impl<'a> FrameTree<'a> {
+    /// The same tree, weighed by what is known to be hidden from [veiled](super::Veiled) viewers.
+    pub fn veiled(self, veils: Veils<'a>) -> FrameTree<'a> {
+        FrameTree { veils: Some(veils), ..self }
+    }
+
+    /// The weight of a light beside the tree in a cell: 1 if nothing is known.
+    #[inline]
+    pub fn weight_beside(&self, cell: Cell, row: usize) -> f64 {
+        self.veils.map_or(1.0, |veils| veils.weight_beside(cell, row))
     }
 }
 

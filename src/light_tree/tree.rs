@@ -247,6 +247,20 @@ impl<D: AsRef<[u8]>> LightTree<D> {
         (kind == Some(TreeKind::Still)).then_some(row as u32)
     }
 
+    /// BLAKE3 over the groups of the tree of what stands still and their numbers: what a table of what
+    /// is [learned](super::learned) is about.
+    pub fn still_key(&self) -> [u8; 32] {
+        *self.known.still_key.get_or_init(|| {
+            let mut hasher = blake3::Hasher::new();
+            if let Some(row) = self.still_tree() {
+                let tree = &self.trees()[row as usize];
+                hasher.update(&tree.first_group.to_le_bytes());
+                hasher.update_rayon(bytemuck::cast_slice(self.groups_of(tree)));
+            }
+            *hasher.finalize().as_bytes()
+        })
+    }
+
     /// The row of a frame among [`frames`](LightTree::frames).
     pub fn row_of(&self, frame: i32) -> Option<usize> {
         self.frames().binary_search_by_key(&frame, |row| row.frame).ok()

@@ -5,6 +5,7 @@
 //! an instance, it takes the viewer along into that tree's space.
 
 use super::importance::{Cluster, Factors, Sight, factors};
+use super::veil::Cell;
 use crate::math::Similarity;
 use glam::Vec3;
 
@@ -34,6 +35,12 @@ pub trait Viewer: Copy {
 
     /// The same viewer in another space.
     fn within(&self, space: &Similarity) -> Self;
+
+    /// The cell that tells what is [hidden](super::veil) from it.
+    #[inline(always)]
+    fn cell(&self) -> Cell {
+        Cell::NONE
+    }
 }
 
 /// A point where light is wanted.

@@ -46,11 +46,25 @@ impl Contributions {
     /// The contribution of one light, times the weight of picking it against finding it by reflection
     /// (power heuristic). `expected` is the expected number of picks of the light.
     pub fn of(&self, light: Picked, expected: f64) -> f64 {
-        let Contribution { luminance, by_reflection } = match light {
+        let Contribution { luminance, by_reflection } = self.row(light);
+        f64::from(luminance) * f64::from(power_heuristic(expected as f32, by_reflection))
+    }
+
+    /// The luminance that the point reflects of a light.
+    pub fn luminance(&self, light: Picked) -> f64 {
+        f64::from(self.row(light).luminance)
+    }
+
+    /// How many lights at infinity there are.
+    pub fn beside_count(&self) -> usize {
+        self.beside.len()
+    }
+
+    fn row(&self, light: Picked) -> Contribution {
+        match light {
             Picked::Emitter(emitter) => self.of_emitter[emitter as usize],
             Picked::Beside(row) => self.beside[row as usize],
-        };
-        f64::from(luminance) * f64::from(power_heuristic(expected as f32, by_reflection))
+        }
     }
 
     /// The sum of all contributions, without weights.

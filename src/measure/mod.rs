@@ -18,6 +18,7 @@
 //! | `html` | how does it look? |
 //! | `pilot` | what will a shot take? |
 //! | `probes`, `contributions` | how much variance does a way have, exactly? |
+//! | `oracle` | what would exact visibility give? |
 //! | `machine` | what was it measured on? |
 //!
 //! This is the only module that reads the clock, beside that of render jobs.
@@ -29,6 +30,7 @@ mod entrant;
 mod frontier;
 mod html;
 mod machine;
+mod oracle;
 mod picture;
 mod pilot;
 mod probes;

@@ -12,11 +12,12 @@
 
 use super::contributions::{Contributions, shares};
 use super::entrant::Way;
-use crate::light_tree::{LightTree, NoSuchFrame};
+use super::oracle;
+use crate::light_tree::{Cell, Glossy, LightTree, Moments, NoSuchFrame, Veil, Veils, WIDTH};
 use crate::math::random::{Sampler, hash};
 use crate::render::noise::Grey;
 use crate::render::path::{Integrator, Vertex};
-use crate::render::picker::{LightPicker, PickScratch, Wanted};
+use crate::render::picker::{LightPicker, PickScratch, Site, Wanted};
 use crate::render::{LightStrategy, RenderDelegate, RenderSettings};
 use rayon::prelude::*;
 use serde::Serialize;
@@ -35,6 +36,9 @@ pub struct ProbeOptions {
     pub grey: Option<Grey>,
     /// The seed that chooses the points.
     pub seed: u32,
+    /// Measure the ways of the tree again, with so many clusters weighed by how much of them is
+    /// exactly seen. With `visibility`.
+    pub oracles: Vec<u32>,
 }
 
 /// What was measured.
@@ -75,11 +79,18 @@ pub struct StrategyReport {
     pub nanoseconds: f64,
 }
 
+/// So many times a probe is put into a cell, which is random near a border.
+const CELLS_OF_PROBE: u32 = 8;
+
 /// A point, and what all lights give it.
 struct Probe {
     wanted: Wanted,
     contributions: Contributions,
     sum: f64,
+    /// The cells that it may be in, each as often as the others.
+    cells: Vec<Cell>,
+    /// The same without shadows, for oracles.
+    all: Option<Contributions>,
 }
 
 /// Measures ways of picking lights at points that paths from the delegate's camera visit in a frame.
@@ -96,20 +107,74 @@ pub fn at_probes(
 }
 
 fn report(integrator: &Integrator, options: &ProbeOptions) -> ProbeReport {
-    let probes: Vec<Probe> =
+    let mut probes: Vec<Probe> =
         (0..options.probes).into_par_iter().filter_map(|i| probe(integrator, i, options)).collect();
     let grey = options.grey.unwrap_or_else(|| Grey::of(probes.iter().map(|probe| probe.sum)));
-    let strategies = options.ways.iter().map(|way| {
-        let Way { strategy, split, split_by } = *way;
-        let settings = RenderSettings { strategy, split, split_by, ..integrator.settings.clone() };
-        of_way(integrator, way, &settings, grey, &probes)
-    });
+    let of_all = |veils: Option<Veils>, told: &str, ways: &[Way], probes: &[Probe]| {
+        let of = |way: &Way| {
+            let Way { strategy, split, split_by } = *way;
+            let settings =
+                RenderSettings { strategy, split, split_by, ..integrator.settings.clone() };
+            let tree = integrator.picker.tree().clone();
+            let tree = veils.map_or(tree.clone(), |veils| tree.veiled(veils));
+            let picker = LightPicker::new(&settings, tree, integrator.infinite);
+            StrategyReport {
+                name: format!("{way}{told}"),
+                ..of_way(way, &picker, &settings, grey, probes)
+            }
+        };
+        ways.iter().map(of).collect::<Vec<_>>()
+    };
+    let mut strategies = of_all(None, "", &options.ways, &probes);
+    let walking: Vec<Way> =
+        options.ways.iter().filter(|way| way.strategy.splits()).copied().collect();
+    if let Some(cells) = integrator.cells {
+        for probe in &mut probes {
+            let (Site::At(receiver) | Site::Glossy(Glossy { receiver, .. })) = probe.wanted.site
+            else {
+                continue;
+            };
+            let cell = |u: u32| {
+                let u = (u as f32 + 0.5) / CELLS_OF_PROBE as f32;
+                cells.find(receiver.point, receiver.normal, u)
+            };
+            probe.cells = (0..CELLS_OF_PROBE).map(cell).collect();
+        }
+        strategies.extend(of_all(None, ", learned", &walking, &probes));
+    }
+    for &clusters in &options.oracles {
+        let known: Vec<Vec<Veil>> = probes
+            .par_iter()
+            .map(|probe| {
+                let (Site::At(receiver) | Site::Glossy(Glossy { receiver, .. })) =
+                    probe.wanted.site
+                else {
+                    return Default::default();
+                };
+                let all = probe.all.as_ref().unwrap_or(&probe.contributions);
+                let tree = integrator.picker.tree();
+                oracle::veils(tree, &receiver, clusters, (&probe.contributions, all))
+            })
+            .collect();
+        let each = known.iter().map(Vec::len).max().unwrap_or(0);
+        let mut rows = Vec::new();
+        for own in &known {
+            rows.extend_from_slice(own);
+            let none = Veil { group: u32::MAX, weights: [255; WIDTH] };
+            rows.extend(std::iter::repeat_n(none, each - own.len()));
+        }
+        for (probe, cell) in probes.iter_mut().zip(0..) {
+            probe.cells = vec![Cell(cell)];
+        }
+        let veils = Veils::new(probes.len(), &rows);
+        strategies.extend(of_all(Some(veils), &format!(", oracle {clusters}"), &walking, &probes));
+    }
     ProbeReport {
         probes: probes.len(),
         lights: integrator.picker.tree().unforced_count() as usize
             + integrator.infinite.iter().filter(|light| !light.forced).count(),
         grey,
-        strategies: strategies.collect(),
+        strategies,
     }
 }
 
@@ -130,22 +195,22 @@ fn probe(integrator: &Integrator, number: u32, options: &ProbeOptions) -> Option
     let contributions = Contributions::at(integrator, &vertex, options.visibility);
     let sum = contributions.sum();
     let wanted = vertex.wanted(Some(&mut Sampler::new(seed, 1)));
-    (sum > 0.0).then_some(Probe { wanted, contributions, sum })
+    let is_asked = !options.oracles.is_empty();
+    let all = is_asked.then(|| Contributions::at(integrator, &vertex, false));
+    (sum > 0.0).then_some(Probe { wanted, contributions, sum, cells: vec![Cell::NONE], all })
 }
 
 fn of_way(
-    integrator: &Integrator,
     way: &Way,
+    picker: &LightPicker,
     settings: &RenderSettings,
     grey: Grey,
     probes: &[Probe],
 ) -> StrategyReport {
-    let tree = integrator.picker.tree().clone();
-    let picker = LightPicker::new(settings, tree, integrator.infinite);
     let rows: Vec<(f64, f64)> = probes
         .par_iter()
         .map(|probe| {
-            let (variance, lights) = of_probe(&picker, settings.strategy, probe);
+            let (variance, lights) = of_probe(picker, settings.strategy, probe);
             (grey.of_deviation(variance, probe.sum), lights)
         })
         .collect();
@@ -166,7 +231,7 @@ fn of_way(
         ninth_decile: quantile(0.9),
         lights: mean(|row| row.1),
         most_lights: rows.iter().map(|row| row.1).fold(0.0, f64::max),
-        nanoseconds: nanoseconds(&picker, probes),
+        nanoseconds: nanoseconds(picker, probes),
     }
 }
 
@@ -176,10 +241,15 @@ fn of_probe(picker: &LightPicker, strategy: LightStrategy, probe: &Probe) -> (f6
     match strategy {
         LightStrategy::All => (0.0, f64::from(picker.count())),
         LightStrategy::Tree | LightStrategy::Distance => {
-            let moments = picker.moments(wanted, picker.splitting(0), &|light, expected| {
-                probe.contributions.of(light, expected)
-            });
-            (moments.variance, moments.lights)
+            let of_cell = |&cell: &Cell| {
+                let wanted = Wanted { cell, ..*wanted };
+                picker.moments(&wanted, picker.splitting(0), &|light, expected| {
+                    probe.contributions.of(light, expected)
+                })
+            };
+            let all: Vec<Moments> = probe.cells.iter().map(of_cell).collect();
+            let mean = |of: fn(&Moments) -> f64| all.iter().map(of).sum::<f64>() / all.len() as f64;
+            (mean(|moments| moments.variance), mean(|moments| moments.lights))
         }
         LightStrategy::Exhaustive => {
             let mut importances = Vec::new();
@@ -207,9 +277,9 @@ fn nanoseconds(picker: &LightPicker, probes: &[Probe]) -> f64 {
             let mut picked = 0u32;
             for (number, probe) in (0..).zip(probes) {
                 let u = (hash(round, number) >> 8) as f32 / 16_777_216.0;
-                picker.pick(&probe.wanted, picker.splitting(0), (u, number), &mut scratch, |_| {
-                    picked += 1
-                });
+                let wanted = Wanted { cell: probe.cells[0], ..probe.wanted };
+                picker
+                    .pick(&wanted, picker.splitting(0), (u, number), &mut scratch, |_| picked += 1);
             }
             std::hint::black_box(picked);
             started.elapsed().as_nanos() as f64 / probes.len().max(1) as f64

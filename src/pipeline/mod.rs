@@ -1,6 +1,6 @@
 //! Floor 5: jobs, the only place where ingest meets the tree.
 //!
-//! A job is what one run of a program does: [`BuildJob`] and [`RenderJob`]. It tells [`Event`]s to a
+//! A job is what one run of a program does: [`BuildJob`], [`LearnJob`] and [`RenderJob`]. It tells [`Event`]s to a
 //! [`Watch`], prints nothing, and reads the clock only to report where time went. Jobs are made of stages:
 //!
 //! | stage | question |
@@ -11,6 +11,7 @@
 //! | [`build_tree`], [`rebuild_tree`] | the trees of a shot, anew or upon an earlier file |
 //! | [`ShotTrees`] | the trees of one frame after the other: from a file, or built |
 //! | [`check_fresh`], [`standing`] | does a whole file still belong to the scene; if not, which lights changed? |
+//! | [`open_learned`], [`caveat`] | what is hidden from where; does that still belong to the shot? |
 //! | [`Stamp`] | what was a picture rendered from? |
 
 mod agreement;
@@ -23,6 +24,8 @@ mod fit;
 mod forced;
 mod frames;
 mod fresh;
+mod learn_job;
+mod learned;
 mod look;
 pub mod option;
 mod read;
@@ -48,6 +51,8 @@ pub use fresh::{
     OpenedTree, StaleTree, TreeError, check_agreement, check_fresh, check_output, is_tree_file,
     open_base, open_tree,
 };
+pub use learn_job::{LearnError, LearnJob, LearnReport};
+pub use learned::{LearnedError, OpenedTable, caveat, is_table_file, open_learned, view_key};
 pub use read::ReadError;
 pub use render_job::{
     Audit, Effort, FrameCounts, FrameNoise, Preview, Quality, RenderError, RenderJob, RenderReport,

@@ -134,7 +134,7 @@ impl Stamper {
 }
 
 /// The camera's node, and all above it.
-fn place_of<'a>(scene: &'a Scene, camera: &Camera) -> Vec<&'a Node> {
+pub(super) fn place_of<'a>(scene: &'a Scene, camera: &Camera) -> Vec<&'a Node> {
     let node = |number: u32| &scene.nodes[number as usize];
     let above = |node_: &&'a Node| node_.parent.map(node);
     std::iter::successors(Some(node(camera.node)), above).collect()

@@ -14,6 +14,7 @@ use super::rays::RayScene;
 use super::settings::RenderSettings;
 use super::surface::Surfaces;
 use crate::emitter::{Emitters, PosedEmitters, Skies};
+use crate::light_tree::learned::Learned;
 use crate::light_tree::{LightTree, NoSuchFrame};
 use crate::math::random::hash;
 use crate::scene::{Camera, Scene};
@@ -32,6 +33,7 @@ pub struct RenderDelegate<'a> {
     settings: RenderSettings,
     plan: Result<Plan, PlanError>,
     camera: Camera,
+    learned: Option<Learned<'a>>,
 }
 
 /// Why there is no frame.
@@ -84,7 +86,13 @@ impl<'a> RenderDelegate<'a> {
             plan: Plan::new(scene, emitters, &settings),
             settings,
             camera,
+            learned: None,
         }
+    }
+
+    /// Weighs lights by what has been learned of the shot from now on, wherever that belongs to the tree.
+    pub fn set_learned(&mut self, learned: Option<Learned<'a>>) {
+        self.learned = learned;
     }
 
     /// Renders with other settings from now on.
@@ -107,10 +115,32 @@ impl<'a> RenderDelegate<'a> {
         frame: i32,
         work: impl FnOnce(&Integrator) -> T,
     ) -> Result<T, NoSuchFrame> {
+        self.at_frame_knowing(tree, frame, self.learned.as_ref(), work)
+    }
+
+    /// The same, with what has been learned so far.
+    ///
+    /// # Errors
+    /// As [`at_frame`](Self::at_frame).
+    ///
+    /// # Panics
+    /// As [`at_frame`](Self::at_frame).
+    pub fn at_frame_knowing<T>(
+        &self,
+        tree: &LightTree<impl AsRef<[u8]>>,
+        frame: i32,
+        learned: Option<&Learned>,
+        work: impl FnOnce(&Integrator) -> T,
+    ) -> Result<T, NoSuchFrame> {
         let pose = self.scene.pose_at(self.scene.timeline.seconds_at(f64::from(frame)));
         let infinite = self.skies.lights(self.scene, &pose);
         assert_eq!(tree.emitter_count(), self.emitters.len(), "the tree belongs to another scene");
+        let learned = learned.filter(|learned| learned.tree == tree.still_key());
         let tree = tree.at_frame(frame)?;
+        let tree = match learned {
+            Some(learned) => tree.veiled(learned.veils),
+            None => tree,
+        };
         let (width, height) = (self.settings.width, self.settings.height);
         Ok(work(&Integrator {
             settings: &self.settings,
@@ -120,6 +150,7 @@ impl<'a> RenderDelegate<'a> {
             infinite: &infinite,
             picker: LightPicker::new(&self.settings, tree, &infinite),
             camera: CameraRays::new(&self.camera, &pose, width, height),
+            cells: learned.map(|learned| learned.cells),
             fog: Fog::new(self.scene, &pose, &self.camera),
             groups: self.plan.as_ref().ok().and_then(|plan| plan.groups.as_ref()),
             reflections_find_light: self.settings.mis

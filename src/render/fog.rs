@@ -15,9 +15,9 @@
 
 use super::direct::another;
 use super::path::{Integrator, PathScratch, TraceStats};
-use super::picker::{PickScratch, Wanted};
+use super::picker::{PickScratch, Site, Wanted};
 use super::rays::Anchor;
-use crate::light_tree::{Picked, Segment, Splitting};
+use crate::light_tree::{Cell, Picked, Segment, Splitting};
 use crate::math::color::{Rgb, luminance};
 use crate::scene::{Camera, Medium, Pose, Scene};
 use glam::{DAffine3, DVec3, Vec2, Vec3};
@@ -187,7 +187,8 @@ impl Integrator<'_> {
         let lost = -(-extinction * stretch.length).exp_m1();
         let (origin, length) = (stretch.origin.as_vec3(), stretch.length as f32);
         let segment = Segment { origin, direction, length };
-        let wanted = Wanted::Along(segment, (lost / extinction) as f32);
+        let site = Site::Along(segment, (lost / extinction) as f32);
+        let wanted = Wanted { site, cell: Cell::NONE };
         let mut sum = Rgb::ZERO;
         let PathScratch { picks, stats, by_group, blocked, trial, .. } = scratch;
         let how = self.picker.splitting(bounce);

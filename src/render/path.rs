@@ -12,12 +12,13 @@ use super::direct::power_heuristic;
 use super::fog::Fog;
 use super::knob::Trial;
 use super::light_groups::LightGroups;
-use super::picker::{LightPicker, PickScratch, Wanted};
+use super::picker::{LightPicker, PickScratch, Site, Wanted};
 use super::rays::{Anchor, Hit, HitSurface, Seen, SeenLight, Sender, Tracer};
 use super::settings::RenderSettings;
 use super::surface::Surfaces;
 use crate::emitter::{EmitterHit, InfiniteLight, PosedEmitters};
-use crate::light_tree::{Glossy, Lobes, Picked, Receiver, Splitting};
+use crate::light_tree::learned::Cells;
+use crate::light_tree::{Cell, Glossy, Lobes, Picked, Receiver, Splitting};
 use crate::math::built_in;
 use crate::math::color::Rgb;
 use crate::math::random::{Sampler, hash};
@@ -26,6 +27,8 @@ use glam::{Vec2, Vec3};
 
 /// Bounces before Russian roulette may end a path.
 const SURE_BOUNCES: u32 = 3;
+/// Tells the random number that chooses a cell from others.
+const CELL: u32 = 0x6365_6c6c;
 
 /// One frame, ready to be traced.
 pub struct Integrator<'a> {
@@ -43,6 +46,8 @@ pub struct Integrator<'a> {
     pub picker: LightPicker<'a>,
     /// Rays through pixels.
     pub camera: CameraRays,
+    /// Where what is known to be hidden is known, if it is.
+    pub cells: Option<Cells<'a>>,
     /// What fills the space, if anything does.
     pub fog: Option<Fog>,
     /// Which light group each light is in, if that is asked for.
@@ -112,6 +117,7 @@ struct Origin {
 }
 
 /// A point on the way, about to be lit.
+#[derive(Clone, Copy)]
 pub struct Vertex {
     /// Where it is.
     pub anchor: Anchor,
@@ -208,7 +214,7 @@ impl Integrator<'_> {
             }
             let Some(vertex) = vertex.filter(|_| bounce < self.settings.depth) else { break };
 
-            let wanted = self.wanted(&vertex, &mut sampler);
+            let wanted = self.wanted(&vertex, &mut sampler, hash(seed, bounce));
             let [pick, lu, lv, roulette] = sampler.next_4d();
             let numbers = (pick, Vec2::new(lu, lv), hash(seed, bounce));
             let at = (bounce, throughput);
@@ -252,14 +258,26 @@ impl Integrator<'_> {
     /// The vertex that a path from the eye reaches after `bounces` bounces, or its last one if it ends
     /// earlier. `None` if it hits nothing that reflects.
     pub fn probe(&self, x: u32, y: u32, seed: u32, bounces: u32) -> Option<Vertex> {
+        let mut last = None;
+        self.for_each_vertex((x, y), seed, bounces + 1, |vertex| last = Some(*vertex));
+        last
+    }
+
+    /// Calls `visit` with the first vertices of a path through a pixel, at most so many.
+    pub fn for_each_vertex(
+        &self,
+        (x, y): (u32, u32),
+        seed: u32,
+        most: u32,
+        mut visit: impl FnMut(&Vertex),
+    ) {
         let mut sampler = Sampler::new(seed, 0);
         let [px, py, lx, ly] = sampler.next_4d();
         let CameraRay { mut origin, mut direction, mut reach_m } =
             self.camera.ray(x, y, Vec2::new(px, py), Vec2::new(lx, ly));
         let accept = self.cutouts(seed);
         let mut lights = Vec::new();
-        let mut last = None;
-        for bounce in 0..=bounces {
+        for bounce in 0..most {
             let sender = if bounce == 0 { Sender::Camera } else { Sender::Surface };
             let ray = (origin, direction, reach_m);
             let Some(hit) = self.tracer.look(sender, ray, &accept, &mut lights).hit else { break };
@@ -268,12 +286,11 @@ impl Integrator<'_> {
             let [lobe, bu, bv, _] = sampler.next_4d();
             let next = vertex.reflection.sample(lobe, Vec2::new(bu, bv));
             let next = next.filter(|next| vertex.lets_through(next.wi));
-            let vertex = last.insert(vertex);
+            visit(&vertex);
             let Some(next) = next else { break };
             origin = vertex.anchor.origin_toward(next.wi);
             direction = next.wi;
         }
-        last
     }
 
     /// The vertex at a hit; `None` on a sphere light, which reflects nothing.
@@ -288,11 +305,20 @@ impl Integrator<'_> {
     }
 
     /// What lights are picked for at a vertex.
-    fn wanted(&self, vertex: &Vertex, sampler: &mut Sampler) -> Wanted {
-        match self.picker.looks() {
+    fn wanted(&self, vertex: &Vertex, sampler: &mut Sampler, salt: u32) -> Wanted {
+        let wanted = match self.picker.looks() {
             true => vertex.wanted(self.picker.asks_for_direction().then_some(sampler)),
-            false => Wanted::At(vertex.receiver),
-        }
+            false => Wanted { site: Site::At(vertex.receiver), cell: Cell::NONE },
+        };
+        Wanted { cell: self.cell(vertex, salt), ..wanted }
+    }
+
+    /// The cell of a vertex. `salt` is a hash of the pixel and the bounce: all samples of a pixel are
+    /// in one cell as long as they are in one place, and stay stratified.
+    pub fn cell(&self, vertex: &Vertex, salt: u32) -> Cell {
+        let Some(cells) = self.cells else { return Cell::NONE };
+        let Receiver { point, normal } = vertex.receiver;
+        cells.find(point, normal, (hash(salt, CELL) >> 8) as f32 / 16_777_216.0)
     }
 
     /// The share of light that fog lets through along a stretch of a ray.
@@ -407,7 +433,7 @@ impl Vertex {
         let is_glossy =
             |lobes: &Lobes| built_in::GLOSSY && lobes.at_normal + lobes.toward_grazing > 0.0;
         let Some(lobes) = self.reflection.lobes().filter(is_glossy) else {
-            return Wanted::At(receiver);
+            return Wanted { site: Site::At(receiver), cell: Cell::NONE };
         };
         // Independent of the direction in which the path continues: that one may hit a light, whose
         // weight must not depend on the direction.
@@ -416,7 +442,8 @@ impl Vertex {
             self.reflection.sample(lobe, Vec2::new(u, v))
         });
         let toward = drawn.map_or(receiver.normal, |sample| sample.wi);
-        Wanted::Glossy(Glossy { receiver, to_eye: self.wo, lobes, toward })
+        let glossy = Glossy { receiver, to_eye: self.wo, lobes, toward };
+        Wanted { site: Site::Glossy(glossy), cell: Cell::NONE }
     }
 
     /// Whether `wi` is on the same side as `wo` of the geometric surface, and not only of the shading

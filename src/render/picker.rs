@@ -8,8 +8,8 @@ use super::knob::Knobs;
 use super::settings::{LightStrategy, RenderSettings};
 use crate::emitter::InfiniteLight;
 use crate::light_tree::{
-    DistanceOnly, FrameTree, Glossy, Moments, Pick, Picked, Receiver, Scratch, Segment, SplitTest,
-    Splitting, Viewer,
+    Cell, DistanceOnly, FrameTree, Glossy, Moments, Pick, Picked, Receiver, Scratch, Segment,
+    SplitTest, Splitting, Veiled, Viewer,
 };
 use crate::math::built_in;
 use crate::math::random::{hash, widen};
@@ -28,9 +28,18 @@ pub struct LightPick {
     pub weighed: u32,
 }
 
+/// What light is wanted for, and the cell that tells what is hidden from there.
+#[derive(Clone, Copy, Debug)]
+pub struct Wanted {
+    /// What for.
+    pub site: Site,
+    /// The cell; [`Cell::NONE`] if nothing is known.
+    pub cell: Cell,
+}
+
 /// What light is wanted for.
 #[derive(Clone, Copy, Debug)]
-pub enum Wanted {
+pub enum Site {
     /// A point of a surface.
     At(Receiver),
     /// The same, and how it reflects.
@@ -48,11 +57,11 @@ pub struct PickScratch {
 
 #[derive(Debug, Default)]
 struct TreeScratch {
-    at: Scratch<Receiver>,
-    glossy: Scratch<Glossy>,
-    along: Scratch<Segment>,
-    distance_at: Scratch<DistanceOnly<Receiver>>,
-    distance_along: Scratch<DistanceOnly<Segment>>,
+    at: Scratch<Veiled<Receiver>>,
+    glossy: Scratch<Veiled<Glossy>>,
+    along: Scratch<Veiled<Segment>>,
+    distance_at: Scratch<Veiled<DistanceOnly<Receiver>>>,
+    distance_along: Scratch<Veiled<DistanceOnly<Segment>>>,
 }
 
 /// Evaluates an expression with the viewer that something is wanted for, and its room in the scratch.
@@ -60,26 +69,28 @@ macro_rules! with_viewer {
     ($picker:expr, $wanted:expr, $scratch:expr, |$viewer:ident, $room:ident| $body:expr) => {{
         let scratch: &mut TreeScratch = $scratch;
         let by_distance = $picker.strategy == LightStrategy::Distance;
-        match *$wanted {
-            Wanted::At(receiver) | Wanted::Glossy(Glossy { receiver, .. }) if by_distance => {
-                let receiver = Receiver { normal: Vec3::ZERO, ..receiver };
-                let ($viewer, $room) = (&DistanceOnly(receiver), &mut scratch.distance_at);
+        let Wanted { site, cell } = *$wanted;
+        match site {
+            Site::At(receiver) | Site::Glossy(Glossy { receiver, .. }) if by_distance => {
+                let viewer = DistanceOnly(Receiver { normal: Vec3::ZERO, ..receiver });
+                let ($viewer, $room) = (&Veiled { viewer, cell }, &mut scratch.distance_at);
                 $body
             }
-            Wanted::Along(segment, _) if by_distance => {
-                let ($viewer, $room) = (&DistanceOnly(segment), &mut scratch.distance_along);
+            Site::Along(segment, _) if by_distance => {
+                let viewer = DistanceOnly(segment);
+                let ($viewer, $room) = (&Veiled { viewer, cell }, &mut scratch.distance_along);
                 $body
             }
-            Wanted::At(ref receiver) => {
-                let ($viewer, $room) = (receiver, &mut scratch.at);
+            Site::At(viewer) => {
+                let ($viewer, $room) = (&Veiled { viewer, cell }, &mut scratch.at);
                 $body
             }
-            Wanted::Glossy(ref glossy) => {
-                let ($viewer, $room) = (glossy, &mut scratch.glossy);
+            Site::Glossy(viewer) => {
+                let ($viewer, $room) = (&Veiled { viewer, cell }, &mut scratch.glossy);
                 $body
             }
-            Wanted::Along(ref segment, _) => {
-                let ($viewer, $room) = (segment, &mut scratch.along);
+            Site::Along(viewer, _) => {
+                let ($viewer, $room) = (&Veiled { viewer, cell }, &mut scratch.along);
                 $body
             }
         }
@@ -347,26 +358,30 @@ impl<'a> LightPicker<'a> {
             })
         });
         for (row, light) in (0..).zip(self.infinite).filter(|(_, light)| !light.forced) {
-            visit(Picked::Beside(row), importance_of(light, wanted));
+            visit(Picked::Beside(row), self.importance_beside(row as usize, light, wanted));
         }
     }
 
     /// The importances of the lights at infinity, in the unit of the tree's.
     fn weigh_infinite(&self, wanted: &Wanted, importances: &mut Vec<f64>) {
         importances.clear();
-        let infinite = self.infinite.iter().filter(|_| built_in::DOMES);
-        importances.extend(infinite.map(|light| match light.forced {
+        let infinite = self.infinite.iter().enumerate().filter(|_| built_in::DOMES);
+        importances.extend(infinite.map(|(row, light)| match light.forced {
             true => 0.0,
-            false => importance_of(light, wanted),
+            false => self.importance_beside(row, light, wanted),
         }));
+    }
+
+    fn importance_beside(&self, row: usize, light: &InfiniteLight, wanted: &Wanted) -> f64 {
+        importance_of(light, &wanted.site) * self.tree.weight_beside(wanted.cell, row)
     }
 }
 
 /// An estimate of the irradiance, lux; along a segment integrated over the length that transmits.
-fn importance_of(light: &InfiniteLight, wanted: &Wanted) -> f64 {
-    match wanted {
-        Wanted::At(receiver) => light.importance(receiver.normal),
-        Wanted::Glossy(glossy) => match light.disk() {
+fn importance_of(light: &InfiniteLight, site: &Site) -> f64 {
+    match site {
+        Site::At(receiver) => light.importance(receiver.normal),
+        Site::Glossy(glossy) => match light.disk() {
             _ if light.importance(glossy.receiver.normal) == 0.0 => 0.0,
             Some((towards, half_angle_rad)) => {
                 let reflects = glossy.reflects_from(towards, half_angle_rad);
@@ -374,7 +389,7 @@ fn importance_of(light: &InfiniteLight, wanted: &Wanted) -> f64 {
             }
             None => light.importance(glossy.receiver.normal) * f64::from(glossy.albedo()),
         },
-        Wanted::Along(_, length) => light.importance(Vec3::ZERO) * f64::from(*length),
+        Site::Along(_, length) => light.importance(Vec3::ZERO) * f64::from(*length),
     }
 }
 

@@ -12,6 +12,18 @@ use std::ops::Range;
 pub const MAGIC: [u8; 8] = *b"\x89LTR\r\n\x1a\n";
 /// Readers refuse another major version and read every minor one.
 pub const VERSION: (u16, u16) = (1, 2);
+/// A kind of file: what it begins with, and its version.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Form {
+    /// The first bytes, after the manner of [`MAGIC`].
+    pub magic: [u8; 8],
+    /// Readers refuse another major version and read every minor one.
+    pub version: (u16, u16),
+}
+
+/// Tree files.
+pub const TREE_FILE: Form = Form { magic: MAGIC, version: VERSION };
+
 const BYTE_ORDER_MARK: u32 = 0x0102_0304;
 /// The most sections that a file may have.
 const MOST_SECTIONS: u32 = 256;
@@ -118,7 +130,12 @@ impl<'a> ContainerWriter<'a> {
     }
 
     /// The whole file, with the content's fingerprint in its header.
-    pub fn finish(mut self, fingerprint: [u8; 32]) -> AlignedBytes {
+    pub fn finish(self, fingerprint: [u8; 32]) -> AlignedBytes {
+        self.finish_as(&TREE_FILE, fingerprint)
+    }
+
+    /// The same as a file of another kind.
+    pub fn finish_as(mut self, form: &Form, fingerprint: [u8; 32]) -> AlignedBytes {
         let table_end = HEADER_SIZE + self.sections.len() * ROW_SIZE;
         let mut end = table_end;
         for (row, _) in &mut self.sections {
@@ -127,9 +144,9 @@ impl<'a> ContainerWriter<'a> {
             end += row.length as usize;
         }
         let header = Header {
-            magic: MAGIC,
-            major: VERSION.0,
-            minor: VERSION.1,
+            magic: form.magic,
+            major: form.version.0,
+            minor: form.version.1,
             byte_order: BYTE_ORDER_MARK,
             file_length: end as u64,
             section_count: self.sections.len() as u32,
@@ -198,8 +215,16 @@ impl<D: AsRef<[u8]>> Container<D> {
     /// # Errors
     /// Whatever [`StoreError`] says about headers and tables.
     pub fn open(data: D, known: &[SectionId]) -> Result<Container<D>, StoreError> {
+        Container::open_as(&TREE_FILE, data, known)
+    }
+
+    /// The same of another kind of file.
+    ///
+    /// # Errors
+    /// As [`open`](Container::open).
+    pub fn open_as(form: &Form, data: D, known: &[SectionId]) -> Result<Container<D>, StoreError> {
         let bytes = data.as_ref();
-        let header = read_header(bytes)?;
+        let header = read_header(form, bytes)?;
         let table_end = HEADER_SIZE + header.section_count as usize * ROW_SIZE;
         let actual = bytes.len() as u64;
         if header.section_count > MOST_SECTIONS
@@ -308,12 +333,16 @@ impl<D: AsRef<[u8]>> Container<D> {
     }
 }
 
-fn read_header(bytes: &[u8]) -> Result<Header, StoreError> {
-    let start = &bytes[..bytes.len().min(MAGIC.len())];
-    if start != MAGIC {
+fn read_header(form: &Form, bytes: &[u8]) -> Result<Header, StoreError> {
+    let start = &bytes[..bytes.len().min(form.magic.len())];
+    if start != form.magic {
         // What `\r\n` -> `\n`, `\n` -> `\r\n` and a cleared high bit leave of the magic.
-        let text_mode: [&[u8]; 3] =
-            [b"\x89LTR\n\x1a\n", b"\x89LTR\r\r\n\x1a", b"\x09LTR\r\n\x1a\n"];
+        let [high, a, b, c, ..] = form.magic;
+        let text_mode: [&[u8]; 3] = [
+            &[high, a, b, c, b'\n', 0x1a, b'\n'],
+            &[high, a, b, c, b'\r', b'\r', b'\n', 0x1a],
+            &[high & 0x7f, a, b, c, b'\r', b'\n', 0x1a, b'\n'],
+        ];
         let damaged = text_mode.iter().any(|form| bytes.starts_with(form));
         return Err(if damaged { StoreError::TextMode } else { StoreError::NotOurs });
     }
@@ -327,8 +356,8 @@ fn read_header(bytes: &[u8]) -> Result<Header, StoreError> {
     if header.byte_order != BYTE_ORDER_MARK {
         return Err(StoreError::ByteOrder);
     }
-    if header.major != VERSION.0 {
-        return Err(StoreError::Version { found: header.major, known: VERSION.0 });
+    if header.major != form.version.0 {
+        return Err(StoreError::Version { found: header.major, known: form.version.0 });
     }
     Ok(header)
 }

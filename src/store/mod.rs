@@ -17,7 +17,9 @@ mod seal;
 
 pub use atomic::{check_room, check_writable, folder_of, is_full, sweep, write_atomically};
 pub use bytes::{ALIGNMENT, AlignedBytes};
-pub use container::{Container, ContainerWriter, MAGIC, Section, SectionId, VERSION};
+pub use container::{
+    Container, ContainerWriter, Form, MAGIC, Section, SectionId, TREE_FILE, VERSION,
+};
 pub use error::{RULES_OF_HEADER, RULES_OF_TABLE, StoreError};
 pub use map::MappedFile;
 pub use regular::{open_regular, read_regular};

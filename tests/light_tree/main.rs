@@ -16,3 +16,4 @@ mod scenes;
 mod splitting;
 mod staleness;
 mod support;
+mod veils;

@@ -50,7 +50,14 @@ fn measured() -> Measured {
         let settings = RenderSettings { width: 160, height: 90, ..Default::default() };
         let camera = stage.scene.cameras[0].clone();
         let delegate = RenderDelegate::new(&stage.scene, &set.emitters, camera, settings);
-        let options = ProbeOptions { probes: 192, visibility, ways: ways(), grey: None, seed: 0 };
+        let options = ProbeOptions {
+            probes: 192,
+            visibility,
+            ways: ways(),
+            grey: None,
+            seed: 0,
+            oracles: vec![],
+        };
         let report = at_probes(&delegate, &set.tree, 1, &options).unwrap();
         assert!(report.probes > 100, "{name}: {} points are lit", report.probes);
         for row in report.strategies {

@@ -12,6 +12,7 @@ mod fog;
 mod forced;
 mod knobs;
 mod layers;
+mod learned;
 mod lens;
 mod moving;
 mod noise;

@@ -1,7 +1,9 @@
 //! No seams in the noise: where the decision to split changes, variance does not jump.
 
-use crate::stage::{Stage, at, direct, facing, lambert};
+use crate::stage::{Set, Stage, at, direct, facing, lambert};
 use crate::strategies::Way;
+use candelabra::light_tree::Veil;
+use candelabra::light_tree::learned::{Plane, Table};
 use candelabra::render::{RenderDelegate, RenderSettings, SplitBy};
 use candelabra::scene::LightKind;
 use glam::{DVec3, Vec3};
@@ -10,7 +12,7 @@ const SAMPLES: u32 = 1 << 13;
 
 /// The relative variance of one sample of each pixel of a row across a floor, away from a cluster of lights
 /// above its one end.
-fn profile(way: Way) -> Vec<f64> {
+fn profile(way: Way, table: impl Fn(&Set) -> Table) -> Vec<f64> {
     const PIXELS: u32 = 96;
     let mut stage = Stage::default();
     stage.quad([12.0; 2], lambert(Vec3::splat(0.5)), facing(DVec3::ZERO, DVec3::Y));
@@ -27,8 +29,10 @@ fn profile(way: Way) -> Vec<f64> {
     // Pictures of one sample each: those of one picture are not independent.
     let set = stage.set();
     let (emitters, tree) = (&set.emitters, &set.tree);
+    let table = table(&set);
     let camera = stage.scene.cameras[0].clone();
     let mut delegate = RenderDelegate::new(&stage.scene, emitters, camera, settings.clone());
+    delegate.set_learned(table.view());
     let mut sums = [[0.0; 2]; PIXELS as usize];
     for seed in 0..SAMPLES {
         delegate.set_settings(RenderSettings { seed, ..settings.clone() });
@@ -55,8 +59,9 @@ fn largest_jump(profile: &[f64]) -> f64 {
 #[test]
 fn variance_changes_smoothly_where_the_seed_has_seams() {
     let most = u32::MAX;
-    let hard = profile(Way { split_by: SplitBy::SolidAngle, most, ..Way::split(0.99) });
-    let graded = profile(Way { most, ..Way::split(0.1) });
+    let none = |_: &Set| Table::default();
+    let hard = profile(Way { split_by: SplitBy::SolidAngle, most, ..Way::split(0.99) }, none);
+    let graded = profile(Way { most, ..Way::split(0.1) }, none);
     let print = |name: &str, profile: &[f64]| {
         let row: Vec<String> = profile.iter().step_by(3).map(|v| format!("{v:.4}")).collect();
         println!("{name}: {} (largest step {:.2})", row.join(" "), largest_jump(profile));
@@ -66,4 +71,23 @@ fn variance_changes_smoothly_where_the_seed_has_seams() {
     // Of each, about 0.07 is how well the variance can be told.
     assert!(largest_jump(&hard) - 1.0 > 2.0 * (largest_jump(&graded) - 1.0));
     assert!(largest_jump(&graded) < 1.15);
+}
+
+/// Two cells, one of which takes half of the lights for half hidden. The band is that of cells which are a
+/// metre and a half wide.
+#[test]
+fn cells_have_no_seams() {
+    let table = |width: f32| {
+        move |set: &Set| {
+            let row =
+                |byte| Veil { group: 0, weights: [255, byte, 255, byte, 255, byte, 255, byte] };
+            let planes = vec![Plane { at: 0.8, width, axis: 0 }];
+            Table { tree: set.tree.still_key(), planes, rows: vec![row(255), row(215)] }
+        }
+    };
+    let [sharp, soft] =
+        [0.0, 0.75].map(|width| largest_jump(&profile(Way::split(0.1), table(width))));
+    println!("sharp {sharp:.2}, soft {soft:.2}");
+    assert!(sharp > 1.2, "the cells do not differ: {sharp:.2}");
+    assert!(soft - 1.0 < 0.5 * (sharp - 1.0), "{soft:.2} of {sharp:.2}");
 }

@@ -25,6 +25,9 @@ pub struct Arguments {
     /// Its light tree, from `candelabra build`; built in memory if not given
     #[arg(long)]
     pub tree: Option<PathBuf>,
+    /// What of its lights is hidden from where, from `candelabra learn`
+    #[arg(long, value_name = "FILE")]
+    pub learned: Option<PathBuf>,
     /// Frames: 1001-1048, 1001-1048x2, 1,5,9; the first of the scene if not given
     #[arg(short, long, allow_hyphen_values = true)]
     pub frames: Option<Frames>,
@@ -177,6 +180,7 @@ impl Arguments {
         RenderJob {
             scene: self.scene.clone(),
             tree: self.tree.clone(),
+            learned: self.learned.clone(),
             frames: self.frames.clone(),
             output: self.output.clone(),
             view: self.view.clone(),

@@ -5,17 +5,22 @@ use crate::stderr::say;
 use anyhow::{Context, Result};
 use candelabra::emitter::Emitters;
 use candelabra::inspect::{self, SceneReport, TreeReport};
-use candelabra::light_tree::LightTree;
+use candelabra::light_tree::veil::decode;
+use candelabra::light_tree::{LightTree, WIDTH};
 use candelabra::page::{Lines, Short, counted, plain_json};
 use candelabra::pipeline::{self, Strict};
 use clap::Args;
 use serde::Serialize;
+use serde_json::json;
 use std::io::Write;
 use std::path::PathBuf;
 
+/// A cluster with a smaller weight is called hidden.
+const HIDDEN: f32 = 0.25;
+
 #[derive(Args)]
 pub struct Arguments {
-    /// A scene (.gltf, .glb, .obj) or a tree file (.ltree)
+    /// A scene (.gltf, .glb, .obj), a tree file (.ltree) or a table of what is hidden (.lvis)
     file: PathBuf,
     /// Name so many of a tree's heaviest lights
     #[arg(long, value_name = "COUNT", default_value_t = 10)]
@@ -45,9 +50,38 @@ pub fn run(arguments: &Arguments) -> Result<()> {
     if pipeline::is_tree_file(&arguments.file) {
         let tree = pipeline::open_tree(&arguments.file, true)?;
         show_tree(arguments, &tree, None)
+    } else if pipeline::is_table_file(&arguments.file) {
+        show_table(arguments)
     } else {
         show_scene(arguments)
     }
+}
+
+/// A table of what is hidden from where.
+fn show_table(arguments: &Arguments) -> Result<()> {
+    let table = pipeline::open_learned(&arguments.file, true)?;
+    let cells = table.view().map_or(0, |learned| learned.cells.count());
+    let groups = table.rows().len() / cells.max(1);
+    let lanes = table.rows().iter().flat_map(|row| row.weights);
+    let below = lanes.filter(|&byte| decode(byte) < HIDDEN).count();
+    let share = below as f64 / (table.rows().len() * WIDTH).max(1) as f64;
+    let (bytes, meta) = (table.byte_length(), table.meta());
+    if arguments.json {
+        let learned: serde_json::Value = serde_json::from_str(meta).unwrap_or_default();
+        return print_json(&json!({
+            "bytes": bytes, "cells": cells, "groups": groups, "hidden": share, "learned": learned,
+        }));
+    }
+    let mut out = Lines(std::io::stdout().lock());
+    writeln!(out, "{}: sound", arguments.file.display())?;
+    writeln!(out, "  {bytes} bytes; {meta}")?;
+    let (cells, groups) = (counted(cells, "cell"), counted(groups, "group"));
+    writeln!(
+        out,
+        "  {cells}, {groups} in each; {:.1} % of their clusters are hidden",
+        100.0 * share
+    )?;
+    Ok(())
 }
 
 fn show_scene(arguments: &Arguments) -> Result<()> {

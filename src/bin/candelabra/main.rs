@@ -7,6 +7,7 @@ mod diff;
 mod display;
 mod farm;
 mod inspect;
+mod learn;
 mod lost_pages;
 mod measure;
 mod measure_table;
@@ -42,6 +43,8 @@ enum Command {
     Farm(farm::Arguments),
     /// Print what is in a scene or in a tree file, and what the scene requires
     Inspect(inspect::Arguments),
+    /// Learn what of its lights is hidden from where in a shot, and write that to a file that renders map
+    Learn(learn::Arguments),
     /// Measure what each way of picking lights trades: error against time, and variance exactly
     Measure(Box<measure::Arguments>),
     /// Carry out the jobs of a pipeline on this machine
@@ -76,6 +79,7 @@ fn main() -> ExitCode {
         Command::Diff(arguments) => diff::run(arguments),
         Command::Farm(arguments) => farm::run(arguments).map(done),
         Command::Inspect(arguments) => inspect::run(arguments).map(done),
+        Command::Learn(arguments) => learn::run(arguments),
         Command::Measure(arguments) => measure::run(arguments),
         Command::Run(arguments) => run::run(arguments),
         Command::Verify(arguments) => verify::run(arguments),

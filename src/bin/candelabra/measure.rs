@@ -6,11 +6,12 @@ use crate::stderr::say;
 use crate::stop::{STOPPED, Stop};
 use crate::{page, pilot};
 use anyhow::{Context, Result, bail};
+use candelabra::light_tree::learned::LearnedFile;
 use candelabra::measure::{
     self, Asked, Cache, Converged, Entrant, Machine, Onlooker, ProbeOptions, Report, ShotCost,
     Subject, Terms, Trade, TradeError, TradeOptions, Way, at_probes,
 };
-use candelabra::pipeline::{Effort, Event, Stamper, Watch, option};
+use candelabra::pipeline::{Effort, Event, Stamper, Watch, caveat, open_learned, option, view_key};
 use candelabra::render::beauty::Beauty;
 use candelabra::render::frames::Frames;
 use candelabra::render::knob;
@@ -80,6 +81,14 @@ pub struct Arguments {
     /// In exact variances, count what cannot be seen from a point as dark: one ray to each emitter
     #[arg(long)]
     visibility: bool,
+    /// A table of what is hidden, from `candelabra learn`: pictures are rendered with it, and exact variances of
+    /// the tree computed with it, too
+    #[arg(long, value_name = "FILE", conflicts_with = "shot")]
+    pub learned: Option<PathBuf>,
+    /// With --visibility, measure the tree again with so many clusters weighed by how much of them is exactly
+    /// seen: the most that --learned could give
+    #[arg(long, value_name = "CLUSTERS", value_delimiter = ',', requires = "visibility")]
+    oracle: Vec<u32>,
     /// Other noise, other points
     #[arg(long, default_value_t = 0)]
     pub seed: u32,
@@ -208,6 +217,14 @@ fn measure(arguments: &Arguments, display: &Display) -> Result<Measured> {
     let mut report = Report::new(scene, shot.frame, machine, base.clone());
     let mut delegate =
         RenderDelegate::new(&shot.scene, &shot.emitters, shot.camera.clone(), base.clone());
+    let learned = arguments.learned.as_ref().map(|path| open_learned(path, true)).transpose()?;
+    if let Some((opened, path)) = learned.as_ref().zip(arguments.learned.as_ref()) {
+        let view = view_key(&shot.scene, &shot.camera);
+        if let Some(text) = caveat(opened, path, shot.tree.still_key(), view) {
+            say(format_args!("note: {text}"));
+        }
+        delegate.set_learned(opened.view());
+    }
     report.lights = delegate.at_frame(&shot.tree, shot.frame, |integrator| {
         integrator.emitters.emitters.len() + integrator.infinite.len()
     })?;
@@ -219,6 +236,7 @@ fn measure(arguments: &Arguments, display: &Display) -> Result<Measured> {
             ways: exact_ways(arguments),
             grey: arguments.grey,
             seed,
+            oracles: arguments.oracle.clone(),
         };
         report.exact = Some(at_probes(&delegate, &shot.tree, shot.frame, &options)?);
         if display.is_stopped() {
@@ -244,7 +262,8 @@ fn measure(arguments: &Arguments, display: &Display) -> Result<Measured> {
     };
     let rest = format!("{} {:?}", options.reference_samples, options.grey);
     let effort = Effort::samples(base.samples);
-    let stamper = Stamper::new(&shot.scene, &shot.camera, (&base, &effort), ())?;
+    let table = learned.as_ref().map(LearnedFile::fingerprint);
+    let stamper = Stamper::new(&shot.scene, &shot.camera, (&base, &effort), table)?;
     let root = cache_root(arguments)?;
     let fingerprint = stamper.fingerprint(shot.frame, None);
     let cache = Cache::new(&root, &fingerprint, &rest, &report.machine, arguments.fresh);

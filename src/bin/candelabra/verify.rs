@@ -5,7 +5,7 @@ use crate::texture_bar::TextureBar;
 use anyhow::{Context, Result};
 use candelabra::emitter::Emitters;
 use candelabra::page::{Lines, counted};
-use candelabra::pipeline::{self, OpenedTree, TreeError};
+use candelabra::pipeline::{self, LearnedError, OpenedTree, TreeError};
 use candelabra::scene::Scene;
 use candelabra::store::StoreError;
 use clap::Args;
@@ -26,7 +26,7 @@ const TROUBLE: u8 = 2;
     only --scene shows: it integrates textures anew and compares every leaf."
 )]
 pub struct Arguments {
-    /// Tree files
+    /// Tree files, and tables of what is hidden (.lvis)
     #[arg(required = true)]
     files: Vec<PathBuf>,
     /// The scene that the trees belong to: each leaf is compared with its light
@@ -71,6 +71,10 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let mut worst = 0;
     for file in &arguments.files {
         let name = file.display();
+        if pipeline::is_table_file(file) {
+            worst = worst.max(verify_table(file, &mut out)?);
+            continue;
+        }
         worst = worst.max(match pipeline::open_tree(file, true) {
             Ok(tree) => {
                 writeln!(out, "{name}: sound: {}", summary(&tree))?;
@@ -102,6 +106,27 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
         });
     }
     Ok(ExitCode::from(worst))
+}
+
+/// The same of a table of what is hidden.
+fn verify_table(file: &Path, out: &mut impl Write) -> Result<u8> {
+    let name = file.display();
+    match pipeline::open_learned(file, true) {
+        Ok(table) => {
+            let cells = table.view().map_or(0, |learned| learned.cells.count());
+            let (cells, bytes) = (counted(cells, "cell"), counted(table.byte_length(), "byte"));
+            writeln!(out, "{name}: sound: {cells}, {bytes}")?;
+            Ok(0)
+        }
+        Err(LearnedError::Broken { cause, .. }) => {
+            writeln!(out, "{name}: unsound: rule {}: {cause}", cause.violation().rule)?;
+            Ok(UNSOUND)
+        }
+        Err(error) => {
+            say(format_args!("candelabra: {error}"));
+            Ok(TROUBLE)
+        }
+    }
 }
 
 fn belongs(tree: &OpenedTree, file: &Path, owner: &Owner) -> Result<(), TreeError> {

@@ -1,6 +1,6 @@
 //! Why a shot cannot be rendered at all.
 
-use crate::pipeline::{ReadError, TreeError, ViewError};
+use crate::pipeline::{LearnedError, ReadError, TreeError, ViewError};
 use crate::render::PlanError;
 use crate::render::frame_names::FrameNamesError;
 use std::io;
@@ -22,6 +22,9 @@ pub enum RenderError {
     /// The tree file cannot be used, or none can be built.
     #[error(transparent)]
     Tree(#[from] TreeError),
+    /// The table of what is hidden cannot be used.
+    #[error(transparent)]
+    Learned(#[from] LearnedError),
     /// The tree in memory cannot be opened.
     #[error("the light tree of the scene cannot be built: {0}")]
     Build(#[from] crate::store::StoreError),

@@ -29,7 +29,9 @@ pub use error::RenderError;
 pub use frame_noise::{Audit, FrameNoise};
 pub use report::{FrameCounts, RenderReport, SceneCounts, Seconds};
 
-use super::{Event, PreviewStamp, Stamp, Strict, TreeChoice, View, Watch, with_trees};
+use super::{
+    Event, PreviewStamp, Stamp, Strict, TreeChoice, View, Watch, open_learned, with_trees,
+};
 use crate::render::RenderSettings;
 use crate::render::frame_names::FrameNames;
 use crate::render::frames::Frames;
@@ -49,6 +51,8 @@ pub struct RenderJob {
     pub scene: PathBuf,
     /// Its light tree; without one, trees are built in memory.
     pub tree: Option<PathBuf>,
+    /// A table of what is hidden from where, if there is one.
+    pub learned: Option<PathBuf>,
     /// Which frames; the first of the scene if not given.
     pub frames: Option<Frames>,
     /// The names of the pictures.
@@ -111,10 +115,13 @@ impl RenderJob {
         if self.frames.is_none() {
             outputs.check(&shot.frames, self.resume)?;
         }
-        outputs.refuse_inputs(&shot.scene, self.tree.as_deref(), &shot.frames)?;
+        let files = [self.tree.as_deref(), self.learned.as_deref()];
+        outputs.refuse_inputs(&shot.scene, files.into_iter().flatten(), &shot.frames)?;
         outputs.sweep(&shot.frames);
         clock.lap(|seconds| &mut seconds.scene);
 
+        let learned = self.learned.as_deref().map(|path| open_learned(path, self.verify));
+        let learned = learned.transpose()?;
         tell_stage(watch, "looking at the light tree");
         let choice = TreeChoice {
             file: self.tree.clone(),
@@ -134,7 +141,8 @@ impl RenderJob {
                     Writing { job: self, outputs: &outputs, watch, nanoseconds: &nanoseconds };
                 let (frames, written) = std::thread::scope(|scope| {
                     let writer = Writer::start(scope, writing);
-                    let pass = Pass::new(self, &shot, emitters, trees, &outputs, watch, &mut clock);
+                    let inputs = (emitters, trees, learned.as_ref());
+                    let pass = Pass::new(self, &shot, inputs, &outputs, watch, &mut clock);
                     let frames = pass.and_then(|mut pass| pass.render_all(&writer));
                     (frames, writer.finish())
                 });

@@ -66,14 +66,14 @@ impl<'a> Outputs<'a> {
     }
 
     /// No picture may replace what it is rendered from.
-    pub fn refuse_inputs(
+    pub fn refuse_inputs<'p>(
         &self,
-        scene: &Scene,
-        tree: Option<&Path>,
+        scene: &'p Scene,
+        files: impl Iterator<Item = &'p Path>,
         frames: &Frames,
     ) -> Result<(), RenderError> {
         let real = |path: &Path| path.canonicalize().ok();
-        let read = scene.files.iter().map(|file| file.path.as_path()).chain(tree);
+        let read = scene.files.iter().map(|file| file.path.as_path()).chain(files);
         let inputs: BTreeSet<PathBuf> = read.filter_map(real).collect();
         let mut files = frames.as_slice().iter().flat_map(|&frame| self.files(frame));
         match files.find(|file| real(file).is_some_and(|file| inputs.contains(&file))) {

@@ -14,8 +14,8 @@ use super::{RenderError, RenderJob};
 use crate::emitter::Emitters;
 use crate::light_tree::LightTree;
 use crate::pipeline::{
-    Event, Glimpse, PreviewStamp, ShotTrees, Stamp, Stamper, TreeError, Watch, frames_of,
-    frames_of_grey, glimpse, with_knobs,
+    Event, Glimpse, OpenedTable, PreviewStamp, ShotTrees, Stamp, Stamper, TreeError, Watch, caveat,
+    frames_of, frames_of_grey, glimpse, view_key, with_knobs,
 };
 use crate::render::beauty::Beauty;
 use crate::render::knob::pilot;
@@ -33,6 +33,8 @@ pub(super) struct Pass<'a> {
     shot: &'a Shot,
     emitters: &'a Emitters,
     trees: ShotTrees<'a>,
+    /// What is hidden from where, and whether the user has been told what that is worth.
+    learned: Option<(&'a OpenedTable, bool)>,
     outputs: &'a Outputs<'a>,
     stamper: Stamper,
     watch: &'a dyn Watch,
@@ -92,15 +94,18 @@ impl<'a> Pass<'a> {
     pub fn new(
         job: &'a RenderJob,
         shot: &'a Shot,
-        emitters: &'a Emitters,
-        trees: ShotTrees<'a>,
+        (emitters, trees, learned): (&'a Emitters, ShotTrees<'a>, Option<&'a OpenedTable>),
         outputs: &'a Outputs<'a>,
         watch: &'a dyn Watch,
         clock: &'a mut Clock,
     ) -> Result<Pass<'a>, RenderError> {
         let rest = (&job.fog, &job.force_lights, job.verify);
         let knobs = (&shot.settings, &job.effort);
-        let stamper = Stamper::new(&shot.scene, &shot.camera, knobs, rest);
+        // A picture without a table has the stamp that it always had.
+        let stamper = match learned.map(OpenedTable::fingerprint) {
+            None => Stamper::new(&shot.scene, &shot.camera, knobs, rest),
+            Some(table) => Stamper::new(&shot.scene, &shot.camera, knobs, (rest, table)),
+        };
         shot.settings.check(&shot.scene, emitters)?;
         let frames = shot.frames.as_slice().len();
         Ok(Pass {
@@ -108,6 +113,7 @@ impl<'a> Pass<'a> {
             shot,
             emitters,
             trees,
+            learned: learned.map(|table| (table, false)),
             outputs,
             stamper: stamper.map_err(RenderError::Program)?,
             watch,
@@ -160,10 +166,12 @@ impl<'a> Pass<'a> {
         let grey = self.grey()?;
         let settings = self.settings()?;
         let stamp = self.stamp(frame, plan.as_deref())?;
+        self.tell_caveat(frame)?;
         let deadline = self.deadline(writer);
         let until = deadline.as_ref().map(Deadline::latest);
-        let Pass { job, delegate, shot, emitters, trees, progress, watch, clock, .. } = self;
-        let delegate = prepared(delegate, shot, emitters, *watch, clock);
+        let Pass { job, delegate, shot, emitters, trees, learned, progress, watch, clock, .. } =
+            self;
+        let delegate = prepared(delegate, shot, (emitters, *learned), *watch, clock);
         delegate.set_settings(settings.clone());
         let tree = trees.for_frame(frame)?;
         clock.lap(|seconds| &mut seconds.trees);
@@ -271,8 +279,8 @@ impl<'a> Pass<'a> {
         if let Some(settings) = &self.settings {
             return Ok(settings.clone());
         }
-        let Pass { job, delegate, shot, emitters, trees, watch, clock, .. } = self;
-        let delegate = prepared(delegate, shot, emitters, *watch, clock);
+        let Pass { job, delegate, shot, emitters, trees, learned, watch, clock, .. } = self;
+        let delegate = prepared(delegate, shot, (emitters, *learned), *watch, clock);
         let frame = frames_of(&shot.scene)[0];
         let found = with_knobs(delegate, &shot.settings, job.effort.looks(), |delegate| {
             of_any_frame(shot, emitters, trees, frame, |tree| Ok(pilot(delegate, tree, frame)?))
@@ -284,8 +292,8 @@ impl<'a> Pass<'a> {
     /// A small picture of a frame.
     fn glimpse(&mut self, frame: i32) -> Result<&Glimpse, Trouble> {
         if !self.glimpses.contains_key(&frame) {
-            let Pass { delegate, shot, emitters, trees, watch, clock, .. } = self;
-            let delegate = prepared(delegate, shot, emitters, *watch, clock);
+            let Pass { delegate, shot, emitters, trees, learned, watch, clock, .. } = self;
+            let delegate = prepared(delegate, shot, (emitters, *learned), *watch, clock);
             let seen = of_any_frame(shot, emitters, trees, frame, |tree| {
                 glimpse(delegate, &shot.settings, tree, frame, &Patience(*watch))
             })?;
@@ -293,6 +301,19 @@ impl<'a> Pass<'a> {
             self.glimpses.insert(frame, seen);
         }
         Ok(&self.glimpses[&frame])
+    }
+
+    /// Tells, once, if the table of what is hidden does not belong to the shot.
+    fn tell_caveat(&mut self, frame: i32) -> Result<(), Trouble> {
+        if let Some((table, is_told @ false)) = &mut self.learned
+            && let Some(path) = &self.job.learned
+        {
+            *is_told = true;
+            let view = view_key(&self.shot.scene, &self.shot.camera);
+            let text = caveat(table, path, self.trees.for_frame(frame)?.still_key(), view);
+            text.into_iter().for_each(|text| self.watch.tell(Event::Note { text }));
+        }
+        Ok(())
     }
 
     fn stamp(&mut self, frame: i32, plan: Option<&[u32]>) -> Result<Stamp, Trouble> {
@@ -352,14 +373,15 @@ fn of_any_frame<'a, T>(
 fn prepared<'d, 'a>(
     delegate: &'d mut Option<RenderDelegate<'a>>,
     shot: &'a Shot,
-    emitters: &'a Emitters,
+    (emitters, learned): (&'a Emitters, Option<(&'a OpenedTable, bool)>),
     watch: &dyn Watch,
     clock: &mut Clock,
 ) -> &'d mut RenderDelegate<'a> {
     delegate.get_or_insert_with(|| {
         watch.tell(Event::Stage { name: "preparing rays".into() });
         let Shot { scene, camera, settings, .. } = shot;
-        let delegate = RenderDelegate::new(scene, emitters, camera.clone(), settings.clone());
+        let mut delegate = RenderDelegate::new(scene, emitters, camera.clone(), settings.clone());
+        delegate.set_learned(learned.and_then(|(table, _)| table.view()));
         clock.lap(|seconds| &mut seconds.rays);
         delegate
     })
