@@ -7,7 +7,7 @@
 //! | module | question |
 //! |---|---|
 //! | [`delegate`] | what is done once for a shot, and what for each frame? |
-//! | [`path`] | how does light get from a lamp to the eye? |
+//! | [`path`], `walk` | how does light get from a lamp to the eye, and where are its vertices? |
 //! | [`direct`], [`fog`] | what do picked lights give a surface, what a stretch of fog? |
 //! | [`picker`] | which lights are sampled there, and how often is each expected to be? |
 //! | [`knob`] | how readily are clusters split, if nobody says? |
@@ -52,6 +52,7 @@ pub mod png;
 pub mod rays;
 pub mod settings;
 pub mod surface;
+mod walk;
 
 pub use crop::{CropError, Window};
 pub use delegate::{FrameStats, RenderDelegate, RenderError, RenderedFrame};

@@ -255,46 +255,8 @@ impl Integrator<'_> {
         }
     }
 
-    /// The vertex that a path from the eye reaches after `bounces` bounces, or its last one if it ends
-    /// earlier. `None` if it hits nothing that reflects.
-    pub fn probe(&self, x: u32, y: u32, seed: u32, bounces: u32) -> Option<Vertex> {
-        let mut last = None;
-        self.for_each_vertex((x, y), seed, bounces + 1, |vertex| last = Some(*vertex));
-        last
-    }
-
-    /// Calls `visit` with the first vertices of a path through a pixel, at most so many.
-    pub fn for_each_vertex(
-        &self,
-        (x, y): (u32, u32),
-        seed: u32,
-        most: u32,
-        mut visit: impl FnMut(&Vertex),
-    ) {
-        let mut sampler = Sampler::new(seed, 0);
-        let [px, py, lx, ly] = sampler.next_4d();
-        let CameraRay { mut origin, mut direction, mut reach_m } =
-            self.camera.ray(x, y, Vec2::new(px, py), Vec2::new(lx, ly));
-        let accept = self.cutouts(seed);
-        let mut lights = Vec::new();
-        for bounce in 0..most {
-            let sender = if bounce == 0 { Sender::Camera } else { Sender::Surface };
-            let ray = (origin, direction, reach_m);
-            let Some(hit) = self.tracer.look(sender, ray, &accept, &mut lights).hit else { break };
-            reach_m = f32::INFINITY;
-            let Some(vertex) = self.vertex(&hit, -direction) else { break };
-            let [lobe, bu, bv, _] = sampler.next_4d();
-            let next = vertex.reflection.sample(lobe, Vec2::new(bu, bv));
-            let next = next.filter(|next| vertex.lets_through(next.wi));
-            visit(&vertex);
-            let Some(next) = next else { break };
-            origin = vertex.anchor.origin_toward(next.wi);
-            direction = next.wi;
-        }
-    }
-
     /// The vertex at a hit; `None` on a sphere light, which reflects nothing.
-    fn vertex(&self, hit: &Hit, wo: Vec3) -> Option<Vertex> {
+    pub(super) fn vertex(&self, hit: &Hit, wo: Vec3) -> Option<Vertex> {
         let HitSurface::Triangle { instance, triangle, barycentric } = hit.surface else {
             return None;
         };

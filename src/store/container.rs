@@ -1,5 +1,6 @@
 //! The container: a header, a table of sections, and the sections. See the [room's page](super).
 
+use super::header::{self, Form, HEADER_SIZE, Header, TREE_FILE, read_header};
 use super::{ALIGNMENT, AlignedBytes, Record, Rule, StoreError, Violation, error};
 use bytemuck::{Pod, Zeroable};
 use crc32fast::Hasher;
@@ -7,24 +8,6 @@ use rayon::prelude::*;
 use std::fmt;
 use std::ops::Range;
 
-/// The first eight bytes: one with the high bit set, a name, and the line ends that a transfer in
-/// text mode would change (PNG's manner).
-pub const MAGIC: [u8; 8] = *b"\x89LTR\r\n\x1a\n";
-/// Readers refuse another major version and read every minor one.
-pub const VERSION: (u16, u16) = (1, 2);
-/// A kind of file: what it begins with, and its version.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Form {
-    /// The first bytes, after the manner of [`MAGIC`].
-    pub magic: [u8; 8],
-    /// Readers refuse another major version and read every minor one.
-    pub version: (u16, u16),
-}
-
-/// Tree files.
-pub const TREE_FILE: Form = Form { magic: MAGIC, version: VERSION };
-
-const BYTE_ORDER_MARK: u32 = 0x0102_0304;
 /// The most sections that a file may have.
 const MOST_SECTIONS: u32 = 256;
 
@@ -45,20 +28,6 @@ impl fmt::Debug for SectionId {
     }
 }
 
-#[derive(Clone, Copy, Pod, Zeroable)]
-#[repr(C)]
-struct Header {
-    magic: [u8; 8],
-    major: u16,
-    minor: u16,
-    byte_order: u32,
-    file_length: u64,
-    section_count: u32,
-    /// CRC-32 of header and table, with this field zero.
-    checksum: u32,
-    fingerprint: [u8; 32],
-}
-
 /// One row of the section table.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
@@ -77,7 +46,6 @@ pub struct Section {
     pub checksum: u32,
 }
 
-const HEADER_SIZE: usize = size_of::<Header>();
 const ROW_SIZE: usize = size_of::<Section>();
 
 /// Writes a section into its place.
@@ -147,7 +115,7 @@ impl<'a> ContainerWriter<'a> {
             magic: form.magic,
             major: form.version.0,
             minor: form.version.1,
-            byte_order: BYTE_ORDER_MARK,
+            byte_order: header::BYTE_ORDER_MARK,
             file_length: end as u64,
             section_count: self.sections.len() as u32,
             checksum: 0,
@@ -283,7 +251,7 @@ impl<D: AsRef<[u8]>> Container<D> {
         self.fingerprint
     }
 
-    /// The minor version that it was written in. A later one than [`VERSION`]'s may say more, in sections
+    /// The minor version that it was written in. A later one than [`VERSION`](super::VERSION)'s may say more, in sections
     /// and bytes that this version does not know.
     pub fn minor_version(&self) -> u16 {
         self.minor
@@ -331,35 +299,6 @@ impl<D: AsRef<[u8]>> Container<D> {
     pub fn bytes(&self) -> &[u8] {
         self.data.as_ref()
     }
-}
-
-fn read_header(form: &Form, bytes: &[u8]) -> Result<Header, StoreError> {
-    let start = &bytes[..bytes.len().min(form.magic.len())];
-    if start != form.magic {
-        // What `\r\n` -> `\n`, `\n` -> `\r\n` and a cleared high bit leave of the magic.
-        let [high, a, b, c, ..] = form.magic;
-        let text_mode: [&[u8]; 3] = [
-            &[high, a, b, c, b'\n', 0x1a, b'\n'],
-            &[high, a, b, c, b'\r', b'\r', b'\n', 0x1a],
-            &[high & 0x7f, a, b, c, b'\r', b'\n', 0x1a, b'\n'],
-        ];
-        let damaged = text_mode.iter().any(|form| bytes.starts_with(form));
-        return Err(if damaged { StoreError::TextMode } else { StoreError::NotOurs });
-    }
-    if bytes.len() < HEADER_SIZE {
-        return Err(StoreError::Length {
-            promised: HEADER_SIZE as u64,
-            actual: bytes.len() as u64,
-        });
-    }
-    let header: Header = bytemuck::pod_read_unaligned(&bytes[..HEADER_SIZE]);
-    if header.byte_order != BYTE_ORDER_MARK {
-        return Err(StoreError::ByteOrder);
-    }
-    if header.major != form.version.0 {
-        return Err(StoreError::Version { found: header.major, known: form.version.0 });
-    }
-    Ok(header)
 }
 
 fn broken(rule: Rule, section: SectionId) -> StoreError {

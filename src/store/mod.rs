@@ -10,6 +10,7 @@ mod atomic;
 mod bytes;
 mod container;
 mod error;
+mod header;
 mod map;
 mod regular;
 mod rule;
@@ -17,10 +18,9 @@ mod seal;
 
 pub use atomic::{check_room, check_writable, folder_of, is_full, sweep, write_atomically};
 pub use bytes::{ALIGNMENT, AlignedBytes};
-pub use container::{
-    Container, ContainerWriter, Form, MAGIC, Section, SectionId, TREE_FILE, VERSION,
-};
+pub use container::{Container, ContainerWriter, Section, SectionId};
 pub use error::{RULES_OF_HEADER, RULES_OF_TABLE, StoreError};
+pub use header::{Form, MAGIC, TREE_FILE, VERSION};
 pub use map::MappedFile;
 pub use regular::{open_regular, read_regular};
 pub(crate) use rule::rules;
