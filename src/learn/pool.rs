@@ -7,8 +7,6 @@
 
 use crate::light_tree::WIDTH;
 
-/// After so many rays of which none arrived, a cluster is most likely hidden altogether.
-const SURE: f64 = 1024.0;
 /// What is known above counts for so many rays.
 const RAYS_ABOVE: f64 = 4.0;
 
@@ -74,11 +72,6 @@ fn corrected(above: &[Known], tally: &Tally) -> Known {
         known.hidden[lane] = sent > 0.0 && seen == 0.0 || sent == 0.0 && is_hidden;
         known.shares[lane] = match seen {
             _ if sent == 0.0 || is_hidden => likely,
-            // A cluster of which any share may be seen is taken for hidden by one in `sent`, and what is
-            // seen of it then is one in `sent` again.
-            _ if seen == 0.0 && sent > SURE => {
-                likely * RAYS_ABOVE / (sent + RAYS_ABOVE) * SURE / sent
-            }
             _ => (seen + RAYS_ABOVE * likely) / (sent + RAYS_ABOVE),
         };
     }

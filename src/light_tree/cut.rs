@@ -132,7 +132,8 @@ impl FrameTree<'_> {
             if how.is_off() {
                 wanted = leg.map(|leg| (scratch.entries.len(), leg));
                 // What is hidden is known of the root's children, not of the root.
-                let known = self.weigh(&place).filter(|weighed| weighed.veils.is_some());
+                let known = self.veils.and_then(|_| self.weigh(&place));
+                let known = known.filter(|weighed| weighed.veils.is_some());
                 let weight = known.map_or(weight, |weighed| weighed.importances.iter().sum());
                 scratch.push(Entry::Cluster(place), weight, 1.0);
             } else {
