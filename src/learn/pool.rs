@@ -87,7 +87,8 @@ fn merged(a: &[Tally], b: &[Tally]) -> Vec<Tally> {
             (Some(x), Some(y)) if x.group == y.group => {
                 let add = |lane: usize| [0, 1].map(|i| x.lanes[lane][i] + y.lanes[lane][i]);
                 let sum = Tally { group: x.group, lanes: std::array::from_fn(add) };
-                (a.next(), b.next());
+                a.next();
+                b.next();
                 Some(sum)
             }
             (Some(x), Some(y)) if x.group < y.group => a.next().copied(),
