@@ -105,7 +105,7 @@ fn divide_once(receivers: &mut [Coordinates], turn: f32) -> (Plane, usize) {
     let extents = extents(receivers);
     let weight = |axis: usize| if axis < 3 { extents[axis] } else { extents[axis] * turn };
     let axis = (1..6).fold(0, |best, axis| if weight(axis) > weight(best) { axis } else { best });
-    if weight(axis) <= 0.0 || weight(axis).is_nan() {
+    if weight(axis) <= 0.0 {
         return (Plane::default(), receivers.len());
     }
     receivers.sort_unstable_by(|a, b| {

@@ -1,6 +1,6 @@
 //! What has been learned of a shot: from where how much of each cluster is seen.
 //!
-//! A table is a [tree of planes](cells) that divides receivers into cells, and for each cell the
+//! A table is a [tree of planes](Cells) that divides receivers into cells, and for each cell the
 //! [weights](super::veil) of some groups. It is in memory as a [`Table`], and in a file as a [`LearnedFile`],
 //! which is mapped; both give the same view, [`Learned`].
 #![doc = include_str!("format.md")]
