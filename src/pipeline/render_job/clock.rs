@@ -56,6 +56,8 @@ const SHARE: f64 = 0.6;
 const LEFT: f64 = 0.015;
 /// It is interrupted where it is beyond its time by this share.
 const BEYOND: f64 = 0.01;
+/// Nothing is said of a frame that is late by a smaller share.
+const TOLERATED: f64 = 0.03;
 
 impl Deadline {
     /// A frame that has some seconds, until `at`, of which `reserve` are kept for writing it.
@@ -70,6 +72,11 @@ impl Deadline {
             true => self.at + Duration::from_secs_f64(slack),
             false => self.at.checked_sub(Duration::from_secs_f64(-slack)).unwrap_or(self.at),
         }
+    }
+
+    /// How late it may be without a word, seconds.
+    pub fn tolerance(&self) -> f64 {
+        TOLERATED * self.seconds
     }
 
     /// Whether it should have been interrupted.

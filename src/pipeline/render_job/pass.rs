@@ -169,6 +169,7 @@ impl<'a> Pass<'a> {
         self.tell_caveat(frame)?;
         let deadline = self.deadline(writer);
         let until = deadline.as_ref().map(Deadline::latest);
+        let tolerance = deadline.as_ref().map_or(0.0, Deadline::tolerance);
         let Pass { job, delegate, shot, emitters, trees, learned, progress, watch, clock, .. } =
             self;
         let delegate = prepared(delegate, shot, (emitters, *learned), *watch, clock);
@@ -188,11 +189,11 @@ impl<'a> Pass<'a> {
         progress.cut = until.map(|until| Cut { until, least: control.least_samples(&film) });
         let rendered = delegate.expose(&tree, frame, &mut film, &mut control, &*progress)?;
         if let Some(late) =
-            until.map(|until| until.elapsed().as_secs_f64()).filter(|late| *late > 0.1)
+            until.map(|until| until.elapsed().as_secs_f64()).filter(|late| *late > tolerance)
         {
             watch.tell(Event::Note {
                 text: format!(
-                    "frame {frame}: preparation and {FIRST_IN_TIME} samples of each pixel took {late:.1} s \
+                    "frame {frame}: preparation and {FIRST_IN_TIME} samples of each pixel took {late:.2} s \
                      longer than --time allows"
                 ),
             });
