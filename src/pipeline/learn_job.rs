@@ -1,6 +1,6 @@
 //! The job of `candelabra learn`: a scene and its tree in, a table of what is seen out.
 
-use super::learned::view_key;
+use super::learned::{LearnedError, open_learned, view_key};
 use super::read::read_scene;
 use super::{
     ASPECT, Event, ReadError, Strict, TreeChoice, TreeError, View, ViewError, Watch, frames_of,
@@ -75,6 +75,9 @@ pub enum LearnError {
     /// The tree lacks a frame.
     #[error(transparent)]
     NoSuchFrame(#[from] NoSuchFrame),
+    /// A file that is no table is where it should be written.
+    #[error("{}: exists and is no table of what is seen; choose another output, or remove it", .0.display())]
+    InTheWay(PathBuf),
     /// The table cannot be written.
     #[error(transparent)]
     Unwritable(#[from] std::io::Error),
@@ -97,6 +100,9 @@ impl LearnJob {
     pub fn run(&self, watch: &dyn Watch) -> Result<LearnReport, LearnError> {
         sweep(folder_of(&self.output));
         check_writable(&self.output)?;
+        if let Err(LearnedError::NoTable(path)) = open_learned(&self.output, false) {
+            return Err(LearnError::InTheWay(path));
+        }
         let stage = |name: &str| watch.tell(Event::Stage { name: name.into() });
         stage("reading the scene");
         let mut scene = read_scene(&self.scene, self.strict.as_ref(), &self.force_lights, watch)?;

@@ -17,7 +17,7 @@ pub enum StoreError {
     TextMode,
     /// A later major version.
     #[error(
-        "the file has format version {found}.x and this program reads {known}.x; rebuild it with `candelabra build`, or use a newer program"
+        "the file has format version {found}.x and this program reads {known}.x; write it again with this program, or use a newer one"
     )]
     Version {
         /// Major version in the file.
@@ -30,7 +30,7 @@ pub enum StoreError {
     ByteOrder,
     /// Shorter or longer than its header says.
     #[error(
-        "the file is {actual} bytes long and its header promises {promised}: it was cut short or has bytes added; copy or build it again"
+        "the file is {actual} bytes long and its header promises {promised}: it was cut short or has bytes added; copy or write it again"
     )]
     Length {
         /// Length in the header.

@@ -8,6 +8,7 @@ mod error;
 mod files;
 mod inspect;
 mod layers;
+mod learned;
 mod lies;
 mod lights;
 mod measure;
