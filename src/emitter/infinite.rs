@@ -149,6 +149,12 @@ impl InfiniteLight<'_> {
         }
     }
 
+    /// Whether a reflected ray may hit the light.
+    pub fn meets_reflections(&self) -> bool {
+        let is_point = matches!(&self.kind, Kind::Sun(sun) if sun.is_delta());
+        self.visibility.reflections && !is_point
+    }
+
     /// A direction towards the light, for a surface with this normal (zero: in any direction).
     pub fn sample(&self, normal: Vec3, u: Vec2) -> Option<InfiniteSample> {
         match &self.kind {

@@ -21,7 +21,7 @@
 //! | `oracle` | what would exact visibility give? |
 //! | `machine` | what was it measured on? |
 //!
-//! This is the only module that reads the clock, beside that of render jobs.
+//! This is the only module that reads the clock, beside jobs.
 
 mod cache;
 mod contributions;

@@ -32,6 +32,13 @@ pub enum LearnedError {
         /// The rule that is broken.
         cause: StoreError,
     },
+    /// Somebody wrote to the file while it was in use.
+    #[error(
+        "{}: was written to while it was in use, so what it says is not what was checked; write a table under \
+         another name and rename it over the old one, then render again with --resume",
+        .0.display()
+    )]
+    Overwritten(PathBuf),
 }
 
 /// Whether a path is that of a table, by its extension.

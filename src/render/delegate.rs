@@ -13,7 +13,7 @@ use super::plan::{Plan, PlanError};
 use super::rays::RayScene;
 use super::settings::RenderSettings;
 use super::surface::Surfaces;
-use crate::emitter::{Emitters, PosedEmitters, Skies};
+use crate::emitter::{Emitters, InfiniteLight, PosedEmitters, Skies};
 use crate::light_tree::learned::Learned;
 use crate::light_tree::{LightTree, NoSuchFrame};
 use crate::math::random::hash;
@@ -34,6 +34,8 @@ pub struct RenderDelegate<'a> {
     plan: Result<Plan, PlanError>,
     camera: Camera,
     learned: Option<Learned<'a>>,
+    /// Whether a ray may hit an emitter.
+    has_surfaces_that_shine: bool,
 }
 
 /// Why there is no frame.
@@ -87,6 +89,7 @@ impl<'a> RenderDelegate<'a> {
             settings,
             camera,
             learned: None,
+            has_surfaces_that_shine: emitters.have_surfaces(scene),
         }
     }
 
@@ -154,8 +157,8 @@ impl<'a> RenderDelegate<'a> {
             fog: Fog::new(self.scene, &pose, &self.camera),
             groups: self.plan.as_ref().ok().and_then(|plan| plan.groups.as_ref()),
             reflections_find_light: self.settings.mis
-                && (self.emitters.have_surfaces(self.scene)
-                    || infinite.iter().any(|light| light.visibility.reflections)),
+                && (self.has_surfaces_that_shine
+                    || infinite.iter().any(InfiniteLight::meets_reflections)),
         }))
     }
 

@@ -162,32 +162,41 @@ fn a_picture_has_the_stamp_of_what_was_read() {
     shot.render(arguments).ends(0).says("up to date");
 }
 
-/// `cp` over a tree in use: the wrong way to publish. No frame gets a stamp of what was not sampled.
+/// `cp` over a tree or a table in use: the wrong way to publish. No frame gets a stamp of what was not sampled.
 #[test]
-fn a_tree_that_is_written_to_while_it_is_in_use_is_told() {
+fn a_file_that_is_written_to_while_it_is_in_use_is_told() {
     let shot = Shot::moving();
     shot.candelabra(&format!("build {SCENE}")).ends(0);
-    let whole = shot.read("shot.ltree");
+    shot.candelabra(&format!("learn {SCENE} --tree shot.ltree --rays 0.01")).ends(0);
+    for name in ["shot.ltree", "shot.lvis"] {
+        write_to_while_in_use(&shot, name);
+    }
+}
+
+fn write_to_while_in_use(shot: &Shot, name: &str) {
+    let whole = shot.read(name);
     let begin = || {
-        let arguments = "--tree shot.ltree --frames 1-4 -o a.#.exr --spp 4000";
-        Running::start(&shot, arguments).until("preparing")
+        let arguments = "--tree shot.ltree --learned shot.lvis --frames 1-4 -o a.#.exr --spp 4000";
+        Running::start(shot, arguments).until("preparing")
     };
     // Of the same bytes, and shorter: with pages that nobody can read any more.
     for length in [whole.len(), 64] {
         let running = begin();
-        let file = std::fs::File::create(shot.path("shot.ltree")).unwrap();
+        let file = std::fs::File::create(shot.path(name)).unwrap();
         std::io::Write::write_all(&mut &file, &whole[..length]).unwrap();
         let told = running.end();
         assert_eq!(told.code, Some(3), "{told:?}");
         told.complains(&["in use", "rename it over the old one", "--resume"]);
         assert!(shot.names().iter().all(|name| !name.ends_with(".exr")), "{:?}", shot.names());
-        shot.write("shot.ltree", &whole);
+        shot.write(name, &whole);
     }
     // The right way: those who have the old one keep it.
     let running = begin();
-    shot.write("other.ltree", &whole[..64]);
-    std::fs::rename(shot.path("other.ltree"), shot.path("shot.ltree")).unwrap();
+    shot.write("other", &whole[..64]);
+    std::fs::rename(shot.path("other"), shot.path(name)).unwrap();
     assert_eq!(running.end().code, Some(0));
+    shot.write(name, &whole);
+    (1..=4).for_each(|frame| std::fs::remove_file(shot.path(&format!("a.{frame}.exr"))).unwrap());
 }
 
 #[test]

@@ -160,6 +160,9 @@ fn the_last_reflected_ray_is_traced_only_where_it_may_find_light() {
         // So small that hardly a ray hits it.
         (LightKind::Sphere { radiance_nits, radius: 1e-4, shaping: None }, 1),
         (LightKind::Dome { radiance_nits, texture: None }, 1),
+        (LightKind::Distant { irradiance_lux: Vec3::ONE, angle_rad: 0.1 }, 1),
+        // Nor can a sun without a disk be.
+        (LightKind::Distant { irradiance_lux: Vec3::ONE, angle_rad: 0.0 }, 0),
     ];
     for (kind, last) in lamps {
         let what = format!("{kind:?}");

@@ -2,7 +2,7 @@
 
 use crate::page;
 use crate::stderr::say;
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, ensure};
 use candelabra::emitter::Emitters;
 use candelabra::inspect::{self, SceneReport, TreeReport};
 use candelabra::light_tree::veil::decode;
@@ -59,6 +59,11 @@ pub fn run(arguments: &Arguments) -> Result<()> {
 
 /// A table of what is hidden from where.
 fn show_table(arguments: &Arguments) -> Result<()> {
+    ensure!(
+        !arguments.dot && arguments.html.is_none(),
+        "{}: --dot and --html draw scenes and trees; of a table there is --json",
+        arguments.file.display()
+    );
     let table = pipeline::open_learned(&arguments.file, true)?;
     let cells = table.view().map_or(0, |learned| learned.cells.count());
     let groups = table.rows().len() / cells.max(1);

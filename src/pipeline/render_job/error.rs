@@ -59,7 +59,7 @@ impl RenderError {
             self,
             RenderError::Tree(
                 Broken { .. } | Stale { .. } | Contradicts { .. } | Overwritten { .. }
-            )
+            ) | RenderError::Learned(LearnedError::Overwritten(_))
         )
     }
 }

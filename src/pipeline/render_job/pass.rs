@@ -14,8 +14,8 @@ use super::{RenderError, RenderJob};
 use crate::emitter::Emitters;
 use crate::light_tree::LightTree;
 use crate::pipeline::{
-    Event, Glimpse, OpenedTable, PreviewStamp, ShotTrees, Stamp, Stamper, TreeError, Watch, caveat,
-    frames_of, frames_of_grey, glimpse, view_key, with_knobs,
+    Event, Glimpse, LearnedError, OpenedTable, PreviewStamp, ShotTrees, Stamp, Stamper, TreeError,
+    Watch, caveat, frames_of, frames_of_grey, glimpse, view_key, with_knobs,
 };
 use crate::render::beauty::Beauty;
 use crate::render::knob::pilot;
@@ -33,8 +33,10 @@ pub(super) struct Pass<'a> {
     shot: &'a Shot,
     emitters: &'a Emitters,
     trees: ShotTrees<'a>,
-    /// What is hidden from where, and whether the user has been told what that is worth.
-    learned: Option<(&'a OpenedTable, bool)>,
+    /// What is hidden from where.
+    learned: Option<&'a OpenedTable>,
+    /// Whether the user has been told what that is worth.
+    caveat_is_told: bool,
     outputs: &'a Outputs<'a>,
     stamper: Stamper,
     watch: &'a dyn Watch,
@@ -113,7 +115,8 @@ impl<'a> Pass<'a> {
             shot,
             emitters,
             trees,
-            learned: learned.map(|table| (table, false)),
+            learned,
+            caveat_is_told: false,
             outputs,
             stamper: stamper.map_err(RenderError::Program)?,
             watch,
@@ -210,7 +213,7 @@ impl<'a> Pass<'a> {
             clock.lap(|seconds| &mut seconds.audit);
         }
         let stamp = Stamp { noise, ..stamp };
-        trees.check_unwritten()?;
+        self.check_unwritten()?;
         self.rendered += 1;
         let finished = Finished { rendered, stamp, seconds, exposure, leftover };
         let is_taken = writer.hand_over(finished);
@@ -304,12 +307,23 @@ impl<'a> Pass<'a> {
         Ok(&self.glimpses[&frame])
     }
 
+    /// Makes sure that what was checked is what was sampled.
+    fn check_unwritten(&self) -> Result<(), Trouble> {
+        self.trees.check_unwritten()?;
+        match self.learned.zip(self.job.learned.as_ref()) {
+            Some((table, path)) if !table.data().is_unchanged() => {
+                Err(Trouble::OfShot(LearnedError::Overwritten(path.clone()).into()))
+            }
+            _ => Ok(()),
+        }
+    }
+
     /// Tells, once, if the table of what is hidden does not belong to the shot.
     fn tell_caveat(&mut self, frame: i32) -> Result<(), Trouble> {
-        if let Some((table, is_told @ false)) = &mut self.learned
-            && let Some(path) = &self.job.learned
+        if let Some((table, path)) = self.learned.zip(self.job.learned.as_ref())
+            && !self.caveat_is_told
         {
-            *is_told = true;
+            self.caveat_is_told = true;
             let view = view_key(&self.shot.scene, &self.shot.camera);
             let text = caveat(table, path, self.trees.for_frame(frame)?.still_key(), view);
             text.into_iter().for_each(|text| self.watch.tell(Event::Note { text }));
@@ -345,7 +359,7 @@ impl<'a> Pass<'a> {
         if PreviewStamp::of_preview(&preview).as_ref() != Some(&wanted)
             && let Some(stops) = self.exposure()?
         {
-            self.trees.check_unwritten()?;
+            self.check_unwritten()?;
             write_preview(&preview, &Beauty::read(&picture)?, stops, &wanted)?;
         }
         self.clock.lap(|seconds| &mut seconds.resume);
@@ -374,7 +388,7 @@ fn of_any_frame<'a, T>(
 fn prepared<'d, 'a>(
     delegate: &'d mut Option<RenderDelegate<'a>>,
     shot: &'a Shot,
-    (emitters, learned): (&'a Emitters, Option<(&'a OpenedTable, bool)>),
+    (emitters, learned): (&'a Emitters, Option<&'a OpenedTable>),
     watch: &dyn Watch,
     clock: &mut Clock,
 ) -> &'d mut RenderDelegate<'a> {
@@ -382,7 +396,7 @@ fn prepared<'d, 'a>(
         watch.tell(Event::Stage { name: "preparing rays".into() });
         let Shot { scene, camera, settings, .. } = shot;
         let mut delegate = RenderDelegate::new(scene, emitters, camera.clone(), settings.clone());
-        delegate.set_learned(learned.and_then(|(table, _)| table.view()));
+        delegate.set_learned(learned.and_then(OpenedTable::view));
         clock.lap(|seconds| &mut seconds.rays);
         delegate
     })

@@ -61,6 +61,9 @@ impl Trial {
         mut estimate: impl FnMut(&Splitting, ([f32; 4], u32), &mut TraceStats) -> Rgb,
     ) {
         let kind = Knobs::kind(bounce);
+        if self.tried[kind].is_empty() {
+            return;
+        }
         let numbers = [1, 2].map(|twin| {
             let seed = hash(self.seed, hash(twin, bounce));
             (Sampler::new(seed, self.index).next_4d(), seed)
