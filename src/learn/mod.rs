@@ -14,7 +14,7 @@ mod pool;
 
 use crate::light_tree::learned::{Cells, Coordinates, Table, coordinates, divide};
 use crate::light_tree::veil::encode;
-use crate::light_tree::{LightTree, NoSuchFrame, Picked, Receiver, Splitting, Veil, WIDTH};
+use crate::light_tree::{LightTree, NoSuchFrame, Picked, Receiver, Splitting, Veil};
 use crate::math::random::hash;
 use crate::render::RenderDelegate;
 use crate::render::path::{Integrator, Vertex};
@@ -148,7 +148,6 @@ pub fn learn<E>(
 
 /// The veils that counts give.
 fn rows(counts: &Counts, cells: usize) -> Vec<Veil> {
-    let none = Veil { group: u32::MAX, weights: [255; WIDTH] };
     let found: Vec<Mutex<Vec<Veil>>> = (0..cells).map(|_| Mutex::default()).collect();
     pool(
         (0..cells).into_par_iter().map(|cell| counts.tallies(cell)).collect(),
@@ -158,35 +157,26 @@ fn rows(counts: &Counts, cells: usize) -> Vec<Veil> {
                 let weights = known.shares.map(|share| encode(share.sqrt()));
                 Veil { group: known.group, weights }
             };
-            let mut rows: Vec<Veil> = known.iter().map(veil).collect();
-            rows.resize(counts.groups, none);
+            let rows = known.iter().map(veil).collect();
             *found[cell].lock().unwrap_or_else(PoisonError::into_inner) = rows;
         },
     );
     let rows =
         found.into_iter().map(|rows| rows.into_inner().unwrap_or_else(PoisonError::into_inner));
-    rows.flatten().collect()
+    Veil::padded(rows.collect())
 }
 
 /// Receivers that paths of a frame visit.
 fn visited(integrator: &Integrator, paths: u32, seed: u32) -> Vec<Coordinates> {
     let of_path = |number: u32| {
         let mut found = Vec::new();
-        let (x, y) = pixel(integrator, number, paths);
+        let (x, y) = integrator.spread_pixel(number, paths);
         integrator.for_each_vertex((x, y), hash(seed, number), BOUNCES, |vertex| {
             found.push(coordinates(vertex.receiver.point, vertex.receiver.normal));
         });
         found
     };
     (0..paths).into_par_iter().flat_map_iter(of_path).collect()
-}
-
-/// Spread over the picture by a lattice of rank 1.
-fn pixel(integrator: &Integrator, number: u32, of: u32) -> (u32, u32) {
-    let (width, height) = (integrator.settings.width, integrator.settings.height);
-    let x = (number as f64 + 0.5) / f64::from(of) * f64::from(width);
-    let y = (f64::from(number) * 0.618_033_988_749_895).fract() * f64::from(height);
-    ((x as u32).min(width - 1), (y as u32).min(height - 1))
 }
 
 /// A few of the receivers of a cell, from all over it.
@@ -207,7 +197,7 @@ fn look(
     (number, of, seed): (u32, u32, u32),
     scratch: &mut PickScratch,
 ) {
-    let (x, y) = pixel(integrator, number, of);
+    let (x, y) = integrator.spread_pixel(number, of);
     let accept = integrator.cutouts(hash(seed, 1));
     let mut bounce = 0;
     integrator.for_each_vertex((x, y), seed, BOUNCES, |vertex| {

@@ -26,6 +26,21 @@ pub struct Veil {
     pub weights: [u8; WIDTH],
 }
 
+impl Veil {
+    /// Of no group: the last rows of a cell that has fewer than others.
+    pub const NONE: Veil = Veil { group: u32::MAX, weights: [255; WIDTH] };
+
+    /// The rows of all cells, one cell after the other, each with as many as the longest.
+    pub fn padded(cells: Vec<Vec<Veil>>) -> Vec<Veil> {
+        let of_each = cells.iter().map(Vec::len).max().unwrap_or(0);
+        let padded = cells.into_iter().map(|mut rows| {
+            rows.resize(of_each, Veil::NONE);
+            rows
+        });
+        padded.flatten().collect()
+    }
+}
+
 /// The veils of all cells: each has the same number, by ascending group.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Veils<'a> {

@@ -13,11 +13,11 @@
 use super::contributions::{Contributions, shares};
 use super::entrant::Way;
 use super::oracle;
-use crate::light_tree::{Cell, Glossy, LightTree, Moments, NoSuchFrame, Veil, Veils, WIDTH};
+use crate::light_tree::{Cell, LightTree, Moments, NoSuchFrame, Receiver, Veil, Veils};
 use crate::math::random::{Sampler, hash};
 use crate::render::noise::Grey;
 use crate::render::path::{Integrator, Vertex};
-use crate::render::picker::{LightPicker, PickScratch, Site, Wanted};
+use crate::render::picker::{LightPicker, PickScratch, Wanted};
 use crate::render::{LightStrategy, RenderDelegate, RenderSettings};
 use rayon::prelude::*;
 use serde::Serialize;
@@ -84,6 +84,7 @@ const CELLS_OF_PROBE: u32 = 8;
 
 /// A point, and what all lights give it.
 struct Probe {
+    receiver: Receiver,
     wanted: Wanted,
     contributions: Contributions,
     sum: f64,
@@ -115,8 +116,10 @@ fn report(integrator: &Integrator, options: &ProbeOptions) -> ProbeReport {
             let Way { strategy, split, split_by } = *way;
             let settings =
                 RenderSettings { strategy, split, split_by, ..integrator.settings.clone() };
-            let tree = integrator.picker.tree().clone();
-            let tree = veils.map_or(tree.clone(), |veils| tree.veiled(veils));
+            let mut tree = integrator.picker.tree().clone();
+            if let Some(veils) = veils {
+                tree = tree.veiled(veils);
+            }
             let picker = LightPicker::new(&settings, tree, integrator.infinite);
             StrategyReport {
                 name: format!("{way}{told}"),
@@ -130,39 +133,19 @@ fn report(integrator: &Integrator, options: &ProbeOptions) -> ProbeReport {
         options.ways.iter().filter(|way| way.strategy.splits()).copied().collect();
     if let Some(cells) = integrator.cells {
         for probe in &mut probes {
-            let (Site::At(receiver) | Site::Glossy(Glossy { receiver, .. })) = probe.wanted.site
-            else {
-                continue;
-            };
-            let cell = |u: u32| {
-                let u = (u as f32 + 0.5) / CELLS_OF_PROBE as f32;
-                cells.find(receiver.point, receiver.normal, u)
-            };
+            let Receiver { point, normal } = probe.receiver;
+            let cell = |u: u32| cells.find(point, normal, (u as f32 + 0.5) / CELLS_OF_PROBE as f32);
             probe.cells = (0..CELLS_OF_PROBE).map(cell).collect();
         }
         strategies.extend(of_all(None, ", learned", &walking, &probes));
     }
     for &clusters in &options.oracles {
-        let known: Vec<Vec<Veil>> = probes
-            .par_iter()
-            .map(|probe| {
-                let (Site::At(receiver) | Site::Glossy(Glossy { receiver, .. })) =
-                    probe.wanted.site
-                else {
-                    return Default::default();
-                };
-                let all = probe.all.as_ref().unwrap_or(&probe.contributions);
-                let tree = integrator.picker.tree();
-                oracle::veils(tree, &receiver, clusters, (&probe.contributions, all))
-            })
-            .collect();
-        let each = known.iter().map(Vec::len).max().unwrap_or(0);
-        let mut rows = Vec::new();
-        for own in &known {
-            rows.extend_from_slice(own);
-            let none = Veil { group: u32::MAX, weights: [255; WIDTH] };
-            rows.extend(std::iter::repeat_n(none, each - own.len()));
-        }
+        let of = |probe: &Probe| {
+            let all = probe.all.as_ref().unwrap_or(&probe.contributions);
+            let tree = integrator.picker.tree();
+            oracle::veils(tree, &probe.receiver, clusters, (&probe.contributions, all))
+        };
+        let rows = Veil::padded(probes.par_iter().map(of).collect());
         for (probe, cell) in probes.iter_mut().zip(0..) {
             probe.cells = vec![Cell(cell)];
         }
@@ -181,11 +164,7 @@ fn report(integrator: &Integrator, options: &ProbeOptions) -> ProbeReport {
 /// Point `number` of `of` points that camera paths visit. Even numbers are at the first hit of a path,
 /// odd ones after one bounce. `None` if the path hits nothing that reflects.
 pub fn visited(integrator: &Integrator, number: u32, of: u32, seed: u32) -> Option<Vertex> {
-    // Spread over the picture by a lattice of rank 1.
-    let (width, height) = (integrator.settings.width, integrator.settings.height);
-    let x = (number as f32 + 0.5) / of as f32 * width as f32;
-    let y = (f64::from(number) * 0.618_033_988_749_895).fract() as f32 * height as f32;
-    let (x, y) = ((x as u32).min(width - 1), (y as u32).min(height - 1));
+    let (x, y) = integrator.spread_pixel(number, of);
     integrator.probe(x, y, hash(seed, number), number % 2)
 }
 
@@ -197,7 +176,8 @@ fn probe(integrator: &Integrator, number: u32, options: &ProbeOptions) -> Option
     let wanted = vertex.wanted(Some(&mut Sampler::new(seed, 1)));
     let is_asked = !options.oracles.is_empty();
     let all = is_asked.then(|| Contributions::at(integrator, &vertex, false));
-    (sum > 0.0).then_some(Probe { wanted, contributions, sum, cells: vec![Cell::NONE], all })
+    let (receiver, cells) = (vertex.receiver, vec![Cell::NONE]);
+    (sum > 0.0).then_some(Probe { receiver, wanted, contributions, sum, cells, all })
 }
 
 fn of_way(

@@ -7,6 +7,14 @@ use crate::math::random::Sampler;
 use glam::Vec2;
 
 impl Integrator<'_> {
+    /// Pixel `number` of `of` that are spread over the picture, by a lattice of rank 1: its column and row.
+    pub fn spread_pixel(&self, number: u32, of: u32) -> (u32, u32) {
+        let (width, height) = (self.settings.width, self.settings.height);
+        let x = (number as f32 + 0.5) / of as f32 * width as f32;
+        let y = (f64::from(number) * 0.618_033_988_749_895).fract() as f32 * height as f32;
+        ((x as u32).min(width - 1), (y as u32).min(height - 1))
+    }
+
     /// The vertex that a path from the eye reaches after `bounces` bounces, or its last one if it ends
     /// earlier. `None` if it hits nothing that reflects.
     pub fn probe(&self, x: u32, y: u32, seed: u32, bounces: u32) -> Option<Vertex> {

@@ -7,8 +7,8 @@ use signal_hook::low_level;
 use std::io;
 
 const WORDS: &[u8] =
-    b"candelabra: a tree file was cut short or overwritten while it was in use, or its disk \
-    failed; publish a tree under another name and rename it over the old one, then start again: \
+    b"candelabra: a tree file or a table was cut short or overwritten while it was in use, or its disk \
+    failed; publish it under another name and rename it over the old one, then start again: \
     candelabra-render keeps finished frames under --resume\n";
 
 /// A mapped file that gets shorter ends the process with SIGBUS when a missing part is read. Nothing can be

@@ -110,7 +110,7 @@ impl<D: AsRef<[u8]>> LearnedFile<D> {
         }
         let of_each = self.rows().len() / cells;
         let ascends = |pair: &[Veil]| {
-            pair[0].group < pair[1].group || pair.iter().all(|row| row.group == u32::MAX)
+            pair[0].group < pair[1].group || pair.iter().all(|row| row.group == Veil::NONE.group)
         };
         for (cell, rows) in self.rows().chunks(of_each.max(1)).enumerate() {
             if let Some(at) = rows.windows(2).position(|pair| !ascends(pair)) {
