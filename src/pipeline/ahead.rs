@@ -65,7 +65,7 @@ pub fn frames_of_grey(frames: &[i32]) -> Vec<i32> {
 }
 
 /// The settings with the knobs of splitting that are best for the shot. `pilot` asks the delegate, and is
-/// called only if there is anything to find out. Where noise decides how many samples there will be,
+/// called only if there is anything to find out. Where `time_decides` how many samples there will be,
 /// those of the settings are only the most, and the usual number is taken for them.
 ///
 /// # Errors
@@ -73,11 +73,11 @@ pub fn frames_of_grey(frames: &[i32]) -> Vec<i32> {
 pub fn with_knobs<E>(
     delegate: &mut RenderDelegate,
     settings: &RenderSettings,
-    noise_decides: bool,
+    time_decides: bool,
     pilot: impl FnOnce(&RenderDelegate) -> Result<Knobs, E>,
 ) -> Result<RenderSettings, E> {
     let usual = RenderSettings::default().samples;
-    let samples = if noise_decides { settings.samples.min(usual) } else { settings.samples };
+    let samples = if time_decides { settings.samples.min(usual) } else { settings.samples };
     let asked = RenderSettings { samples, ..settings.clone() };
     let knobs = match pilot_pays(&asked) {
         true => {

@@ -55,8 +55,8 @@ pub use learn_job::{LearnError, LearnJob, LearnReport};
 pub use learned::{LearnedError, OpenedTable, caveat, is_table_file, open_learned, view_key};
 pub use read::ReadError;
 pub use render_job::{
-    Audit, Effort, FrameCounts, FrameNoise, Preview, Quality, RenderError, RenderJob, RenderReport,
-    SceneCounts, Seconds,
+    Audit, Effort, FrameCounts, FrameNoise, Plan, Preview, Quality, RenderError, RenderJob,
+    RenderReport, SceneCounts, Seconds,
 };
 pub use rig::carry_camera;
 pub use shot_trees::{ShotTrees, TreeChoice, TreeFile, with_trees};

@@ -5,10 +5,11 @@
 //! stamp of a new one, however the files change while it is rendered.
 
 use super::content::scene_fingerprint;
-use super::render_job::{Effort, FrameNoise};
+use super::render_job::{Effort, FrameNoise, Plan};
 use crate::light_tree::ALGORITHM_VERSION;
 use crate::render::RenderSettings;
 use crate::render::exr::read_metadata;
+use crate::render::knob::Knobs;
 use crate::render::png::read_text;
 use crate::scene::{Camera, Node, Scene};
 use serde::{Deserialize, Serialize};
@@ -36,6 +37,9 @@ pub struct Stamp {
     pub settings: serde_json::Value,
     /// The camera, for people.
     pub camera: serde_json::Value,
+    /// The knobs of splitting that it was rendered with.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub knobs: Option<Knobs>,
     /// What its noise has come to, if that was looked at.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub noise: Option<FrameNoise>,
@@ -43,9 +47,9 @@ pub struct Stamp {
 
 impl Stamp {
     /// Whether two pictures are of the same. What their noise is found to be may differ: it can be looked
-    /// at more or less closely.
+    /// at more or less closely. Their knobs follow from the rest.
     pub fn is_of_same(&self, other: &Stamp) -> bool {
-        let of = |stamp: &Stamp| Stamp { noise: None, ..stamp.clone() };
+        let of = |stamp: &Stamp| Stamp { knobs: None, noise: None, ..stamp.clone() };
         of(self) == of(other)
     }
 
@@ -112,15 +116,19 @@ impl Stamper {
 
     /// The fingerprint of a frame, without its tree. `plan` has the numbers of samples of its pixels, if
     /// they are given.
-    pub fn fingerprint(&self, frame: i32, plan: Option<&[u32]>) -> String {
+    pub fn fingerprint(&self, frame: i32, plan: Option<&Plan>) -> String {
         let mut hasher = self.common.clone();
         hasher.update(&frame.to_le_bytes());
-        hasher.update(bytemuck::cast_slice(plan.unwrap_or_default()));
+        if let Some(plan) = plan {
+            hasher.update(bytemuck::cast_slice(&plan.counts));
+            let knobs = plan.knobs.iter().flat_map(|knobs| knobs.by_bounce);
+            knobs.for_each(|knob| _ = hasher.update(&knob.to_le_bytes()));
+        }
         hasher.finalize().to_hex().to_string()
     }
 
     /// The stamp of a frame, with the digest of what it samples of the tree.
-    pub fn stamp(&self, frame: i32, plan: Option<&[u32]>, tree: [u8; 32]) -> Stamp {
+    pub fn stamp(&self, frame: i32, plan: Option<&Plan>, tree: [u8; 32]) -> Stamp {
         Stamp {
             software: SOFTWARE.into(),
             frame,
@@ -128,6 +136,7 @@ impl Stamper {
             tree: blake3::Hash::from(tree).to_hex().to_string(),
             settings: self.settings.clone(),
             camera: self.camera.clone(),
+            knobs: None,
             noise: None,
         }
     }

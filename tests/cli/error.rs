@@ -2,6 +2,8 @@
 
 use crate::files::{Shot, picture};
 use candelabra::pipeline::{FrameNoise, Stamp};
+use candelabra::render::Knobs;
+use serde_json::json;
 use std::time::Duration;
 
 fn noise_of(shot: &Shot, name: &str) -> FrameNoise {
@@ -70,6 +72,29 @@ fn a_picture_that_was_limited_by_time_is_repeated_by_its_plan() {
         "sampleCount",
         "--aov",
     ]);
+}
+
+/// Knobs are chosen for the error that is asked for. A plan has no error, and takes those of the picture.
+#[test]
+fn a_plan_repeats_the_knobs_of_the_picture() {
+    let mut shot = Shot::still();
+    shot.edit(|scene| {
+        let lamp = scene["nodes"][1].clone();
+        for i in 0..64 {
+            let mut lamp = lamp.clone();
+            lamp["name"] = json!(format!("lamp {i}"));
+            lamp["translation"] = json!([0.1 * f64::from(i) - 3.2, 1.0, 0.5]);
+            let number = scene["nodes"].as_array().unwrap().len();
+            scene["nodes"].as_array_mut().unwrap().push(lamp);
+            scene["scenes"][0]["nodes"].as_array_mut().unwrap().push(json!(number));
+        }
+    });
+    shot.render("--res 64x36 --error 0.04 -o a.exr").ends(0);
+    shot.render("--res 64x36 --plan a.exr -o b.exr").ends(0);
+    let [a, b] = ["a.exr", "b.exr"].map(|name| Stamp::of_picture(&shot.path(name)).unwrap().knobs);
+    assert!(a == b && a != Some(Knobs::default()), "{a:?} {b:?}");
+    let [a, b] = ["a.exr", "b.exr"].map(|name| picture(&shot.path(name)));
+    assert!(a == b && a.is_some());
 }
 
 /// However short the time, every pixel has samples, and the user hears of it. An audit is beside the time.

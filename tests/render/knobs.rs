@@ -16,7 +16,7 @@ fn plenty(depth: u32) -> RenderSettings {
 fn knobs(set: &Set, settings: RenderSettings) -> Knobs {
     let camera = set.scene.cameras[0].clone();
     let delegate = RenderDelegate::new(set.scene, &set.emitters, camera, settings);
-    pilot(&delegate, &set.tree, 1).unwrap()
+    pilot(&delegate, &set.tree, 1, None).unwrap()
 }
 
 /// A floor under a lattice of points, so far above each other that they are like one or not.
@@ -85,4 +85,19 @@ fn a_knob_that_is_given_is_kept() {
     // Paths too few to learn from get what is usual.
     let few = RenderSettings { samples: 1, ..plenty(2) };
     assert_eq!(knobs(&set, few), Knobs::default());
+}
+
+/// A frame that takes few samples to its error is not worth a pilot that one of many is.
+#[test]
+fn a_pilot_is_as_large_as_the_error_makes_the_frame() {
+    let stage = floor_under_points(0.4);
+    let set = stage.set();
+    let settings = RenderSettings { samples: 16_384, ..direct(48, 0) };
+    let camera = set.scene.cameras[0].clone();
+    let delegate = RenderDelegate::new(set.scene, &set.emitters, camera, settings);
+    let to = |error| pilot(&delegate, &set.tree, 1, Some(error)).unwrap();
+    assert_eq!(to(2.0), Knobs::default());
+    assert_ne!(to(0.005), Knobs::default());
+    // As of any frame with as many samples as are allowed.
+    assert_eq!(to(1e-6), pilot(&delegate, &set.tree, 1, None).unwrap());
 }

@@ -248,7 +248,7 @@ fn measure(arguments: &Arguments, display: &Display) -> Result<Measured> {
     }
     // What a render of this shot would find for itself.
     display.tell(Event::Stage { name: "choosing the knob of splitting".into() });
-    let knobs = knob::pilot(&delegate, &shot.tree, shot.frame)?;
+    let knobs = knob::pilot(&delegate, &shot.tree, shot.frame, None)?;
     let base = RenderSettings { split: Split::ByBounce(knobs), ..base };
     report.settings = base.clone();
     let entrants = entrants(arguments, report.lights);

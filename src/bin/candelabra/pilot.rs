@@ -44,6 +44,7 @@ pub fn run(arguments: &Arguments, display: &Display) -> Result<ShotCost> {
     let base = RenderSettings {
         width,
         height,
+        samples: Effort::MOST,
         depth: arguments.depth.unwrap_or(usual.depth),
         max_lights: arguments.max_lights,
         seed: arguments.seed,
@@ -66,8 +67,9 @@ pub fn run(arguments: &Arguments, display: &Display) -> Result<ShotCost> {
             Grey::of(luminances.into_iter())
         }
     };
-    let base = pipeline::with_knobs(&mut delegate, &base, true, |delegate| {
-        anyhow::Ok(knob::pilot(delegate, &trees.for_frame(own[0])?, own[0])?)
+    let base = pipeline::with_knobs(&mut delegate, &base, false, |delegate| {
+        let error = Some(arguments.error);
+        anyhow::Ok(knob::pilot(delegate, &trees.for_frame(own[0])?, own[0], error)?)
     })?;
     let mut shot = Shot { trees, delegate, base };
     let goal = ErrorGoal { error: arguments.error, grey, most: Effort::MOST };

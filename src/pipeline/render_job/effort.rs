@@ -34,6 +34,11 @@ impl Effort {
     pub fn looks(&self) -> bool {
         self.plan.is_none() && (self.error.is_some() || self.seconds.is_some())
     }
+
+    /// Whether nothing but time tells how many samples there will be.
+    pub(super) fn time_decides(&self) -> bool {
+        self.looks() && self.error.is_none()
+    }
 }
 
 /// Named errors.

@@ -27,6 +27,7 @@ mod writer;
 pub use effort::{Effort, Quality};
 pub use error::RenderError;
 pub use frame_noise::{Audit, FrameNoise};
+pub use plan::Plan;
 pub use report::{FrameCounts, RenderReport, SceneCounts, Seconds};
 
 use super::{

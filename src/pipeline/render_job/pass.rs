@@ -5,7 +5,7 @@ use super::clock::{Clock, Deadline};
 use super::control::{FIRST_IN_TIME, FrameControl};
 use super::frame_noise::{FrameNoise, audit};
 use super::outputs::Outputs;
-use super::plan::read_counts;
+use super::plan::{Plan, read_plan};
 use super::progress::{Cut, FrameProgress, Patience};
 use super::report::FrameCounts;
 use super::shot::Shot;
@@ -20,7 +20,7 @@ use crate::pipeline::{
 use crate::render::beauty::Beauty;
 use crate::render::knob::pilot;
 use crate::render::noise::Grey;
-use crate::render::{self, RenderDelegate, RenderSettings};
+use crate::render::{self, RenderDelegate, RenderSettings, Split};
 use std::collections::BTreeMap;
 use std::time::Duration;
 
@@ -159,7 +159,7 @@ impl<'a> Pass<'a> {
 
     fn render(&mut self, frame: i32, writer: &Writer) -> Result<Outcome, Trouble> {
         let plan = self.plan(frame)?;
-        if self.job.resume && self.is_up_to_date(frame, plan.as_deref())? {
+        if self.job.resume && self.is_up_to_date(frame, plan.as_ref())? {
             let output = self.outputs.picture(frame);
             self.watch.tell(Event::UpToDate { frame: Some(frame), output });
             return Ok(Outcome::UpToDate);
@@ -167,8 +167,8 @@ impl<'a> Pass<'a> {
         self.outputs.check_frame(frame)?;
         let exposure = self.exposure()?;
         let grey = self.grey()?;
-        let settings = self.settings()?;
-        let stamp = self.stamp(frame, plan.as_deref())?;
+        let settings = self.settings(plan.as_ref())?;
+        let stamp = self.stamp(frame, plan.as_ref())?;
         self.tell_caveat(frame)?;
         let deadline = self.deadline(writer);
         let until = deadline.as_ref().map(Deadline::latest);
@@ -188,7 +188,13 @@ impl<'a> Pass<'a> {
             None => blank()?,
         };
         let leftover = checkpoint.as_ref().map(|own| own.path().to_path_buf());
-        let mut control = FrameControl::new(&job.effort, plan, grey, deadline, checkpoint);
+        let mut control = FrameControl::new(
+            &job.effort,
+            plan.map(|plan| plan.counts),
+            grey,
+            deadline,
+            checkpoint,
+        );
         progress.cut = until.map(|until| Cut { until, least: control.least_samples(&film) });
         let rendered = delegate.expose(&tree, frame, &mut film, &mut control, &*progress)?;
         if let Some(late) =
@@ -212,7 +218,7 @@ impl<'a> Pass<'a> {
             noise.audit = Some(audited);
             clock.lap(|seconds| &mut seconds.audit);
         }
-        let stamp = Stamp { noise, ..stamp };
+        let stamp = Stamp { knobs: Some(settings.split.knobs()), noise, ..stamp };
         self.check_unwritten()?;
         self.rendered += 1;
         let finished = Finished { rendered, stamp, seconds, exposure, leftover };
@@ -221,21 +227,21 @@ impl<'a> Pass<'a> {
         if is_taken { Ok(Outcome::HandedOver) } else { Err(Trouble::Stopped) }
     }
 
-    /// The counts of the pixels of a frame, if they are planned.
-    fn plan(&self, frame: i32) -> Result<Option<Vec<u32>>, Trouble> {
+    /// The plan of a frame, if there is one.
+    fn plan(&self, frame: i32) -> Result<Option<Plan>, Trouble> {
         let Some(names) = &self.job.effort.plan else { return Ok(None) };
         let path = names.path(frame);
-        let counts = read_counts(&path)?;
+        let plan = read_plan(&path)?;
         let window =
             self.shot.settings.window().map_err(|error| Trouble::OfFrame(error.to_string()))?;
-        if counts.window != window {
+        if plan.window != window {
             return Err(Trouble::OfFrame(format!(
                 "{}: has other pixels than the picture to be rendered; give its size and crop, or \
                  leave --plan out",
                 path.display()
             )));
         }
-        Ok(Some(counts.of_pixels))
+        Ok(Some(plan))
     }
 
     /// When the next frame is to be done, if that is asked for.
@@ -278,16 +284,22 @@ impl<'a> Pass<'a> {
     }
 
     /// The settings, with the knobs of splitting that are best for the shot: by a pilot in the scene's first
-    /// frame, whatever frames are asked for.
-    fn settings(&mut self) -> Result<RenderSettings, Trouble> {
+    /// frame, whatever frames are asked for. A plan may have knobs of its own.
+    fn settings(&mut self, plan: Option<&Plan>) -> Result<RenderSettings, Trouble> {
+        let asked = &self.shot.settings;
+        if let (Split::Auto, Some(knobs)) = (asked.split, plan.and_then(|plan| plan.knobs)) {
+            return Ok(RenderSettings { split: Split::ByBounce(knobs), ..asked.clone() });
+        }
         if let Some(settings) = &self.settings {
             return Ok(settings.clone());
         }
         let Pass { job, delegate, shot, emitters, trees, learned, watch, clock, .. } = self;
         let delegate = prepared(delegate, shot, (emitters, *learned), *watch, clock);
         let frame = frames_of(&shot.scene)[0];
-        let found = with_knobs(delegate, &shot.settings, job.effort.looks(), |delegate| {
-            of_any_frame(shot, emitters, trees, frame, |tree| Ok(pilot(delegate, tree, frame)?))
+        let found = with_knobs(delegate, &shot.settings, job.effort.time_decides(), |delegate| {
+            of_any_frame(shot, emitters, trees, frame, |tree| {
+                Ok(pilot(delegate, tree, frame, job.effort.error)?)
+            })
         })?;
         clock.lap(|seconds| &mut seconds.ahead);
         Ok(self.settings.insert(found).clone())
@@ -331,7 +343,7 @@ impl<'a> Pass<'a> {
         Ok(())
     }
 
-    fn stamp(&mut self, frame: i32, plan: Option<&[u32]>) -> Result<Stamp, Trouble> {
+    fn stamp(&mut self, frame: i32, plan: Option<&Plan>) -> Result<Stamp, Trouble> {
         let tree = self.trees.for_frame(frame)?;
         let digest = tree.digest_at(frame).map_err(render::RenderError::from)?;
         let stamp = self.stamper.stamp(frame, plan, digest);
@@ -341,7 +353,7 @@ impl<'a> Pass<'a> {
 
     /// Whether a frame's picture is there, whole and of the same. Then a preview that is not is made again
     /// from it.
-    fn is_up_to_date(&mut self, frame: i32, plan: Option<&[u32]>) -> Result<bool, Trouble> {
+    fn is_up_to_date(&mut self, frame: i32, plan: Option<&Plan>) -> Result<bool, Trouble> {
         let picture = self.outputs.picture(frame);
         let earlier = Stamp::of_picture(&picture);
         self.clock.lap(|seconds| &mut seconds.resume);

@@ -1,23 +1,27 @@
-//! Numbers of samples of an earlier picture, to be repeated.
+//! What an earlier picture tells of its samples, to be repeated.
 
+use crate::pipeline::Stamp;
 use crate::render::Window;
 use crate::render::exr::read_channel;
+use crate::render::knob::Knobs;
 use std::io;
 use std::path::Path;
 
-/// Samples of each pixel of a picture.
-pub(super) struct Counts {
+/// How a picture was sampled.
+pub struct Plan {
     /// Which part of the whole picture it is.
     pub window: Window,
-    /// Row after row.
-    pub of_pixels: Vec<u32>,
+    /// Samples of each pixel, row after row.
+    pub counts: Vec<u32>,
+    /// The knobs of splitting, if the picture tells them.
+    pub knobs: Option<Knobs>,
 }
 
 /// More samples than this are an error in the file: a 32-bit float counts no further by ones.
 const MOST: f32 = 16_777_216.0;
 
-/// Reads the layer `sampleCount` of a picture.
-pub(super) fn read_counts(path: &Path) -> io::Result<Counts> {
+/// Reads the layer `sampleCount` of a picture, and its stamp.
+pub(super) fn read_plan(path: &Path) -> io::Result<Plan> {
     let (window, values) = read_channel(path, "sampleCount")?;
     let count = |&value: &f32| {
         let is_count = (0.0..=MOST).contains(&value) && value.fract() == 0.0;
@@ -28,5 +32,7 @@ pub(super) fn read_counts(path: &Path) -> io::Result<Counts> {
             io::Error::new(io::ErrorKind::InvalidData, text)
         })
     };
-    Ok(Counts { window, of_pixels: values.iter().map(count).collect::<io::Result<_>>()? })
+    let counts = values.iter().map(count).collect::<io::Result<_>>()?;
+    let knobs = Stamp::of_picture(path).and_then(|stamp| stamp.knobs);
+    Ok(Plan { window, counts, knobs })
 }

@@ -37,7 +37,8 @@ const SEED: u32 = 0x6b6e_6f62;
 const FIRST_COSTLY: usize = 6;
 
 /// The knobs for a shot with the delegate's settings, by a frame of it. Without [`Split::Auto`] they are
-/// those that the settings tell. A picture of few paths gets the usual ones, because to find out more
+/// those that the settings tell. If an `error` is asked for, a frame has as many samples as that is going to take,
+/// at most those of the settings. A picture of few paths gets the usual knobs, because to find out more
 /// would cost more than it gains.
 ///
 /// # Errors
@@ -49,34 +50,39 @@ pub fn pilot(
     delegate: &RenderDelegate,
     tree: &LightTree<impl AsRef<[u8]>>,
     frame: i32,
+    error: Option<f64>,
 ) -> Result<Knobs, NoSuchFrame> {
-    delegate.at_frame(tree, frame, knobs_for)
+    delegate.at_frame(tree, frame, |integrator| knobs_for(integrator, error))
 }
 
 /// Whether a pilot has anything to find out for these settings.
 pub fn pilot_pays(settings: &RenderSettings) -> bool {
-    pixels_for(settings).is_some()
+    pixels_for(settings, settings.samples).is_some()
 }
 
-/// How many pixels a pilot takes, if it pays.
-fn pixels_for(settings: &RenderSettings) -> Option<u64> {
-    let paths = [settings.width, settings.height, settings.samples].map(u64::from);
+/// How many pixels a pilot takes for a frame of so many samples a pixel, if it pays.
+fn pixels_for(settings: &RenderSettings, samples: u32) -> Option<u64> {
+    let paths = [settings.width, settings.height, samples].map(u64::from);
     let pixels =
         (paths.iter().product::<u64>() / FRAME_PATHS / u64::from(2 * PATHS)).min(MOST_PIXELS);
     let is_asked = settings.split == Split::Auto && settings.strategy.splits();
     (is_asked && settings.depth > 0 && pixels >= LEAST_PIXELS).then_some(pixels)
 }
 
-fn knobs_for(integrator: &Integrator) -> Knobs {
+fn knobs_for(integrator: &Integrator, error: Option<f64>) -> Knobs {
     let settings = integrator.settings;
-    let Some(pixels) = pixels_for(settings) else { return settings.split.knobs() };
+    let samples = match error {
+        Some(error) if pilot_pays(settings) => samples_for(integrator, error),
+        _ => settings.samples,
+    };
+    let Some(pixels) = pixels_for(settings, samples) else { return settings.split.knobs() };
     let tried = |kind: usize, range: Range<usize>| {
         if kind < settings.depth as usize { range } else { 0..0 }
     };
     let handicap = MOST_PIXELS as f64 / pixels as f64;
     let cheap = std::array::from_fn(|kind| tried(kind, 0..FIRST_COSTLY));
     let mut findings = Findings {
-        variance: variance(integrator, PLAIN * pixels as u32),
+        variance: steady_mean(squared_errors(integrator, PLAIN * pixels as u32)),
         ..traced(integrator, pixels as u32, cheap)
     };
     let best = findings.best(handicap);
@@ -104,12 +110,23 @@ struct Pixel {
     own: TraceStats,
 }
 
-/// The variance of pixels with the usual knobs.
-fn variance(integrator: &Integrator, pixels: u32) -> f64 {
+/// How many samples a pixel takes in the mean, to an error and at most those of the settings, with the usual
+/// knobs and as far as a few pixels can tell. Pixels without noise do not count for the error of a frame.
+fn samples_for(integrator: &Integrator, error: f64) -> u32 {
+    let pixels = u64::from(integrator.settings.width) * u64::from(integrator.settings.height);
+    let few = (pixels / u64::from(2 * PATHS)).clamp(LEAST_PIXELS, LEAST_PIXELS * u64::from(PLAIN));
+    let noisy: Vec<f64> =
+        squared_errors(integrator, few as u32).into_iter().filter(|&own| own > 0.0).collect();
+    let of_one = f64::from(2 * PATHS) * noisy.iter().sum::<f64>() / noisy.len().max(1) as f64;
+    (of_one / (error * error)).clamp(1.0, f64::from(integrator.settings.samples)) as u32
+}
+
+/// The squared errors of pixels with the usual knobs.
+fn squared_errors(integrator: &Integrator, pixels: u32) -> Vec<f64> {
     let row = |number| pixel(integrator, number, &Default::default()).halves;
     let pixels: Vec<Halves> = (0..pixels).into_par_iter().map(row).collect();
     let grey = grey(pixels.iter());
-    steady_mean(pixels.iter().map(|halves| halves.squared_error(grey)).collect())
+    pixels.iter().map(|halves| halves.squared_error(grey)).collect()
 }
 
 /// The grey floor for some pixels.
