@@ -20,6 +20,7 @@ from .whole_file import write_atomically
 from .report import CATEGORIES, ExportError
 from .source_hash import recorded_hash, up_to_date
 from .stage import Options, first_line
+from .subdivision import LEVELS
 
 _PURPOSES = ("default", "render", "proxy", "guide")
 
@@ -62,6 +63,9 @@ def _parser() -> argparse.ArgumentParser:
                         help="purposes to export, of default,render,proxy,guide (default: default,render)")  # fmt: skip
     parser.add_argument("--normalize-area", choices=("stage", "metre"), default="stage",
                         help="unit of the area that `normalize` divides by (default: stage)")  # fmt: skip
+    parser.add_argument("--complexity", choices=tuple(LEVELS), default="high",
+                        help="how far subdivision surfaces are refined, as in usdrecord: 0, 1, 2 or 3 times "
+                        "(default: high)")  # fmt: skip
     # `--strict` alone stands for all categories (`main` spells it out), so that it never takes the
     # word after it for its list.
     parser.add_argument("--strict", type=_categories, default=(), metavar="[=LIST]",
@@ -119,6 +123,7 @@ def _run(arguments: argparse.Namespace) -> int:
         variants=tuple(arguments.variant),
         purposes=arguments.purpose,
         normalize_area=arguments.normalize_area,
+        complexity=arguments.complexity,
     )
     if not source.is_file():
         raise ExportError(f"{source}: no such file")

@@ -51,7 +51,7 @@ def export(source: Path, output: Path, options: Options) -> Exported:
     textures = Textures(document, dependencies, frames.first, report.about("materials"))
     surfaces = PreviewSurfaces(textures, frames, report.about("materials"))
     materials = Materials(document, surfaces.read, report.about("materials"))
-    meshes = MeshReader(document, materials, frames, report.about("geometry"))
+    meshes = MeshReader(document, materials, frames, options.complexity, report.about("geometry"))
     tree = PrimTree(stage, meshes, frames, options.purposes, meters_per_unit, report.about("geometry"))
     pictures = LightTextures(document, dependencies, frames, report.about("lights"))
     carriers = LightCarriers(

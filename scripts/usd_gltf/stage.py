@@ -30,6 +30,7 @@ class Options:
     variants: tuple[tuple[str, str, str], ...] = ()
     purposes: tuple[str, ...] = ("default", "render")
     normalize_area: str = "stage"
+    complexity: str = "high"
 
 
 @dataclass(frozen=True)
