@@ -22,6 +22,7 @@ from .light_inputs import Light
 from .materials import Emission, Look, Materials
 from .primvars import CornerValues, as_rows, read_normals, read_primvar
 from .report import Notebook
+from .skinning import Skinning
 from .stage import Frames, changes
 from .subdivision import Subdivider, Surface
 from .triangulate import triangulate
@@ -129,9 +130,15 @@ class MeshReader:
     """Reads meshes once: what USD shares (instances) or repeats is stored once."""
 
     def __init__(
-        self, document: Document, materials: Materials, frames: Frames, complexity: str, report: Notebook
+        self,
+        document: Document,
+        materials: Materials,
+        skinning: Skinning,
+        frames: Frames,
+        complexity: str,
+        report: Notebook,
     ) -> None:
-        self.document, self.materials = document, materials
+        self.document, self.materials, self.skinning = document, materials, skinning
         self.frames, self.code, self.report = frames, frames.first, report
         self.subdivider = Subdivider(complexity, frames, report)
         self._read: dict[tuple, MeshSource | None] = {}
@@ -142,7 +149,7 @@ class MeshReader:
         bound = [self.materials.bound(p) for p in (prim, *subsets)]
         color = self._inherited_color(prim)
         source = prim.GetPrimInPrototype() if prim.IsInstanceProxy() else prim
-        key = (source.GetPath(), tuple(look.path for look in bound), color)
+        key = (source.GetPath(), tuple(look.path for look in bound), color, self.skinning.name(prim))
         if key not in self._read:
             self._read[key] = self._build(prim, subsets, bound)
         return self._read[key]
@@ -239,9 +246,9 @@ class MeshReader:
             why = f"faceVertexIndices run from {corners.min()} to {corners.max()}, points are {len(points)}"
             self.report.warn(path, "mesh with a broken topology", f"{why}; it is left out")
             return None
-        if prim.HasRelationship("skel:skeleton") or prim.GetAttribute("primvars:skel:jointIndices").HasAuthoredValue():
-            self.report.warn(path, "skinned mesh", "UsdSkel has no carrier; the mesh is exported as its points stand")
-        return points, counts, corners, read_normals(prim, self.code, counts, corners, self.report)
+        normals = read_normals(prim, self.code, counts, corners, self.report)
+        points, normals = self.skinning.pose(prim, points, corners, normals)
+        return points, counts, corners, normals
 
     def _holes(self, prim: Usd.Prim) -> np.ndarray:
         attribute = prim.GetAttribute("holeIndices")
