@@ -11,7 +11,7 @@ either: flat shading.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from pxr import Usd, UsdGeom, UsdShade
@@ -59,6 +59,8 @@ class Authored:
     counts: np.ndarray
     corners: np.ndarray
     surface: Surface | None = None
+    carried: dict[tuple[str, int], CornerValues] = field(default_factory=dict)
+    """Primvars that are on the surface already: the pieces of a mesh share them."""
 
 
 @dataclass
@@ -259,7 +261,7 @@ class MeshReader:
         if prim.GetTypeName() in gprims.TYPES:
             return False
         scheme = UsdGeom.Mesh(prim).GetSubdivisionSchemeAttr().Get()
-        if scheme == UsdGeom.Tokens.none:
+        if scheme == UsdGeom.Tokens.none or (scheme == UsdGeom.Tokens.bilinear and self.subdivider.level):
             return False
         self.report.warn(prim.GetPath(), "subdivision surface", f"{scheme}: its cage is exported, with smooth normals")
         return True
@@ -299,8 +301,12 @@ class MeshReader:
 
     def _primvar(self, mesh: Authored, name: str, width: int) -> CornerValues | None:
         """A primvar on the corners of the mesh, or of its refined surface; None if there is none."""
+        if (name, width) in mesh.carried:
+            return mesh.carried[name, width]
         found = read_primvar(mesh.prim, name, width, self.code, mesh.counts, mesh.corners, self.report)
-        return found if found is None or mesh.surface is None else mesh.surface.carry(found)
+        if found is not None and mesh.surface is not None:
+            found = mesh.carried[name, width] = mesh.surface.carry(found)
+        return found
 
     def _display_color(self, mesh: Authored, corners: np.ndarray) -> CornerValues | None:
         """displayColor and displayOpacity as linear RGBA."""

@@ -135,8 +135,8 @@ class Subdivider:
         self._faces = 0
 
     def surface(self, prim: Usd.Prim, points: np.ndarray, counts: np.ndarray, corners: np.ndarray) -> Surface | None:
-        """A mesh's surface, or None if it is no subdivision surface or cannot be refined (the second is
-        reported). Faces with `points` that are not finite, or of fewer than three corners, are no part of it."""
+        """A mesh's surface, or None if it is no subdivision surface, is bilinear and flat, or cannot be refined
+        (the last is reported). Faces with `points` that are not finite, or of fewer than three corners, are no part of it."""
         mesh, code = UsdGeom.Mesh(prim), self.frames.first
         scheme = str(mesh.GetSubdivisionSchemeAttr().Get(code))
         if scheme == "none" or self.level == 0:
@@ -144,6 +144,8 @@ class Subdivider:
         lost = np.bincount(np.repeat(np.arange(len(counts)), counts)[~np.isfinite(points).all(axis=1)[corners]], minlength=len(counts))
         usable = (counts > 2) & (lost == 0)
         faces, kept = np.flatnonzero(usable), np.repeat(usable, counts)
+        if scheme == "bilinear" and _flat(points, counts[faces], corners[kept]):
+            return None
         level = self._level(prim.GetPath(), scheme, counts[faces])
         if level == 0 or not len(faces):
             return None
@@ -212,6 +214,15 @@ class Subdivider:
         if not fits:
             why = f"{len(lengths)} creases of {len(indices)} points, {len(sharpness)} sharpnesses; edges that are not there are left out"
             self.report.warn(path, "creases that do not fit their mesh", why)
+
+
+def _flat(points: np.ndarray, counts: np.ndarray, corners: np.ndarray) -> bool:
+    """Whether all faces are triangles and parallelograms, which `bilinear` leaves as they are."""
+    if not len(counts) or counts.max() > 4:
+        return False
+    quads = points[corners[np.repeat(counts == 4, counts)].reshape(-1, 4)]
+    warp = quads[:, 0] - quads[:, 1] + quads[:, 2] - quads[:, 3]
+    return bool((np.abs(warp).max(axis=1, initial=0) <= 1e-6 * np.ptp(quads, axis=1).max(axis=1, initial=0)).all())
 
 
 def _open_faces(topology: Topology) -> np.ndarray:

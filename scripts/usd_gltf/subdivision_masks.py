@@ -111,9 +111,9 @@ def face_means(level: Topology, values: np.ndarray) -> np.ndarray:
 
 def kinds(level: Topology, edges: np.ndarray, vertices: np.ndarray) -> np.ndarray:
     """How many sharp edges count at each vertex: 2 makes a crease, 3 a corner, fewer a smooth vertex
-    (one is a dart); `edges` and `vertices` are masks of what is sharp."""
+    (one is a dart); `edges` and `vertices` are masks of what is sharp. What no two faces surround stays too."""
     count = np.minimum(level.incident(edges), 3)
-    count[vertices | (level.valence == 0)] = 3
+    count[vertices | ((level.valence < 2) & (count < 2))] = 3
     return count
 
 
@@ -140,7 +140,7 @@ def _vertices(level: Topology, values: np.ndarray, smooth: np.ndarray, side: flo
     sharpness ends before the next level, some of each."""
     now = level.edge_sharpness, level.vertex_sharpness
     if not now[0].any() and not now[1].any():
-        return np.where((level.valence > 0)[:, None], smooth, values)
+        return np.where((level.valence > 1)[:, None], smooth, values)
     then = decayed(now[0]), decayed(now[1])
     before = _by_kind(level, values, smooth, now[0] > 0, now[1] > 0, side)
     semi = (now[0] > 0) & (now[0] < INFINITE), (now[1] > 0) & (now[1] < INFINITE)

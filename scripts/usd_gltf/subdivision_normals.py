@@ -36,10 +36,11 @@ def limit_normals(level: Topology, points: np.ndarray, triangular: bool) -> tupl
     in_order = np.empty(len(level.corners), int)
     in_order[first[run] + place] = np.arange(len(level.corners))
     normals = np.empty((len(runs), 3))
-    for code in np.unique(size * 3 + shape):
-        some = np.flatnonzero(size * 3 + shape == code)
-        corners = in_order[first[some][:, None] + np.arange(code // 3)]
-        normals[some] = (_of_corners, _of_smooth, _of_creases)[code % 3](level, points, corners, triangular)
+    codes = size * 3 + shape
+    alike = np.argsort(codes, kind="stable")
+    for some in np.split(alike, np.flatnonzero(np.diff(codes[alike])) + 1):
+        corners = in_order[first[some][:, None] + np.arange(size[some[0]])]
+        normals[some] = (_of_corners, _of_smooth, _of_creases)[shape[some[0]]](level, points, corners, triangular)
     if len(runs) == np.count_nonzero(level.valence):
         spread = np.tile([0.0, 0.0, 1.0], (level.vertices, 1))
         spread[vertex] = normals

@@ -47,4 +47,12 @@ def _sharp(mesh: Topology, seams: Topology, vertex: np.ndarray, rule: str) -> np
             sharp |= (seam & ~border & (values == 1))[vertex]
         beside = np.bincount(vertex[broken], minlength=mesh.vertices) > 0
         sharp |= (seam & ((values > 2) | ((values == 2) & beside)))[vertex]
+        # Of two regions one is as sharp as the semi-sharp edges that run into the other.
+        inner = np.zeros(len(vertex))
+        semi = (seams.edge_sharpness > 0) & (seams.edge_sharpness < INFINITE)
+        for end in seams.ends:
+            np.maximum.at(inner, end[semi], seams.edge_sharpness[semi])
+        other = np.bincount(vertex, inner, mesh.vertices)[vertex] - inner
+        some = (seam & (values == 2))[vertex] & (inner == 0)
+        seams.vertex_sharpness[some] = np.maximum(seams.vertex_sharpness, other)[some]
     return sharp
