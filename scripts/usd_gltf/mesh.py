@@ -179,9 +179,12 @@ class MeshReader:
         owner = np.zeros(len(counts), int)
         if surface is not None:
             points, counts, corners = surface.points, surface.counts, surface.corners
+            if normals and surface.normals:
+                why = "UsdGeom gives them no meaning; a mesh of polygons has subdivisionScheme = none"
+                self.report.note(prim.GetPath(), "authored normals of a subdivision surface are not used", why)
             normals = surface.normals or (normals and surface.carry(normals))
         with np.errstate(invalid="ignore", over="ignore"):  # the faces of such points go below
-            triangles, faces = triangulate(points, counts, corners)
+            triangles, faces = triangulate(points, counts, corners) if surface is None else surface.triangles
         hidden = np.zeros(len(counts), bool) if surface is None else surface.hidden
         parents = faces if surface is None else surface.parents[faces]
         keep = ~(np.isin(parents, self._holes(prim)) | hidden[faces])
@@ -395,6 +398,12 @@ def _unit(normals: CornerValues, points: np.ndarray, corners: np.ndarray, triang
     length = np.linalg.norm(normals.values, axis=1, keepdims=True)
     if (length > 0).all():
         return replace(normals, values=normals.values / length)
+    if normals.exact:
+        place = np.zeros(len(length), int)
+        place[normals.index] = corners
+        geometric = np.where(length > 0, normals.values, _area_normals(points, corners, triangles)[place])
+        length = np.linalg.norm(geometric, axis=1, keepdims=True)
+        return replace(normals, values=np.where(length > 0, geometric / np.where(length > 0, length, 1.0), [0.0, 0.0, 1.0]))
     spread = normals.values[normals.index]
     geometric = _area_normals(points, corners, triangles)[corners]
     spread = np.where(np.linalg.norm(spread, axis=1, keepdims=True) > 0, spread, geometric)

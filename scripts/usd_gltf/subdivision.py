@@ -10,7 +10,10 @@ refine levels). A mesh is refined less, and reported, where it would have more t
 
 from __future__ import annotations
 
+import hashlib
+from collections import OrderedDict
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from pxr import Usd, UsdGeom
@@ -22,6 +25,7 @@ from .subdivision_masks import limit, refine, refine_linear
 from .subdivision_normals import limit_normals
 from .subdivision_seams import torn
 from .subdivision_topology import INFINITE, Topology, boundaries, build, crease, sharpen_vertices, split_to_quads, split_to_triangles
+from .triangulate import triangulate
 
 LEVELS = {"low": 0, "medium": 1, "high": 2, "veryhigh": 3}
 """Refine level of each complexity."""
@@ -32,6 +36,8 @@ MOST_FACES = 2_000_000
 MOST_FACES_OF_A_STAGE = 16_000_000
 """Faces of all refined meshes of a stage, each counted once however often it is instanced."""
 
+_FACES_KEPT = 200_000
+"""Faces of the last surfaces that are kept for meshes like them; about 1 kB each."""
 
 _RULES = (
     "subdivisionScheme", "interpolateBoundary", "faceVaryingLinearInterpolation", "triangleSubdivisionRule",
@@ -47,6 +53,7 @@ class Rules:
     boundary: str
     face_varying: str
     smooth_triangles: bool
+    left_handed: bool = False
 
 
 @dataclass
@@ -70,7 +77,7 @@ class Surface:
     """
 
     def __init__(self, mesh: Cage, rules: Rules, level: int) -> None:
-        self._mesh, self._rules = mesh, rules
+        self._mesh, self._rules, self.level = mesh, rules, level
         self._triangular = rules.scheme == "loop"
         open_ends = rules.boundary == "none" and not self._linear
         hidden = _open_faces(mesh.topology) if open_ends else np.zeros(len(mesh.faces), bool)
@@ -83,8 +90,13 @@ class Surface:
         self.points, self.normals = self._refine(self._levels, mesh.points, self._linear), None
         if not self._linear:
             normals, index = limit_normals(self._levels[-1], self.points, self._triangular)
-            self.normals = CornerValues(normals, index, exact=True)
+            self.normals = CornerValues(-normals if rules.left_handed else normals, index, exact=True)
             self.points = limit(self._levels[-1], self.points, self._triangular)
+
+    @cached_property
+    def triangles(self) -> tuple[np.ndarray, np.ndarray]:
+        """What `triangulate` makes of the refined faces."""
+        return triangulate(self.points, self.counts, self.corners)
 
     @property
     def _linear(self) -> bool:
@@ -133,6 +145,7 @@ class Subdivider:
     def __init__(self, complexity: str, frames: Frames, report: Notebook) -> None:
         self.level, self.frames, self.report = LEVELS[complexity], frames, report
         self._faces = 0
+        self._kept: OrderedDict[bytes, Surface] = OrderedDict()
 
     def surface(self, prim: Usd.Prim, points: np.ndarray, counts: np.ndarray, corners: np.ndarray) -> Surface | None:
         """A mesh's surface, or None if it is no subdivision surface, is bilinear and flat, or cannot be refined
@@ -146,8 +159,7 @@ class Subdivider:
         faces, kept = np.flatnonzero(usable), np.repeat(usable, counts)
         if scheme == "bilinear" and _flat(points, counts[faces], corners[kept]):
             return None
-        level = self._level(prim.GetPath(), scheme, counts[faces])
-        if level == 0 or not len(faces):
+        if not len(faces) or not self._can_be_refined(prim.GetPath(), scheme, counts[faces]):
             return None
         for name in _RULES:
             if changes(prim.GetAttribute(name), self.frames):
@@ -157,35 +169,58 @@ class Subdivider:
             str(mesh.GetInterpolateBoundaryAttr().Get(code)),
             str(mesh.GetFaceVaryingLinearInterpolationAttr().Get(code)),
             mesh.GetTriangleSubdivisionRuleAttr().Get(code) == UsdGeom.Tokens.smooth,
+            mesh.GetOrientationAttr().Get(code) == UsdGeom.Tokens.leftHanded,
         )
         topology, keys = build(len(points), counts[faces], corners[kept])
         self._sharpen(mesh, topology, keys)
-        self.report.count("subdivision surfaces")
-        surface = Surface(Cage(topology, np.where(np.isfinite(points), points, 0.0), faces, kept), rules, level)
-        if surface.normals is not None and mesh.GetOrientationAttr().Get(code) == UsdGeom.Tokens.leftHanded:
-            surface.normals.values *= -1.0
+        surface = self._shared(prim.GetPath(), Cage(topology, np.where(np.isfinite(points), points, 0.0), faces, kept), rules)
+        if surface is not None:
+            self.report.count("subdivision surfaces")
         return surface
 
-    def _level(self, path: object, scheme: str, counts: np.ndarray) -> int:
-        """The level that the mesh is refined to; less than asked for is reported."""
-        if scheme not in ("catmullClark", "loop", "bilinear"):
-            self.report.warn(path, "subdivision surface", f"there is no scheme {scheme}; its cage is exported")
-            return 0
-        if scheme == "loop" and (counts != 3).any():
-            why = "loop is for triangles alone, and it has other faces; its cage is exported, with smooth normals"
-            self.report.warn(path, "subdivision surface", why)
-            return 0
-        first = 4 * len(counts) if scheme == "loop" else int(counts.sum())
-        faces = [0, *(first * 4**level for level in range(self.level))]
-        most = min(MOST_FACES, MOST_FACES_OF_A_STAGE - self._faces)
-        level = max(level for level in range(self.level + 1) if faces[level] <= most)
-        self._faces += faces[level]
+    def _shared(self, path: object, cage: Cage, rules: Rules) -> Surface | None:
+        """The surface of a cage, or that of an equal one among the last: props are often repeated without instancing."""
+        digest = hashlib.blake2b(repr(rules).encode())
+        topology = cage.topology
+        for part in (cage.points, cage.kept, topology.counts, topology.corners, topology.edge_sharpness,
+                     topology.vertex_sharpness, topology.creased):  # fmt: skip
+            digest.update(np.ascontiguousarray(part).tobytes() + b"|")
+        key = digest.digest()
+        surface = self._kept.pop(key, None)
+        faces = self._faces_by_level(rules.scheme, topology.counts)
+        if surface is None:
+            most = min(MOST_FACES, MOST_FACES_OF_A_STAGE - self._faces)
+            level = max(level for level in range(self.level + 1) if faces[level] <= most)
+            self._faces += faces[level]
+            surface = Surface(cage, rules, level) if level else None
+        level = surface.level if surface is not None else 0
         if level < self.level:
             what = "subdivision surface that is refined less" if level else "subdivision surface"
             bound = f"{MOST_FACES} faces a mesh, {MOST_FACES_OF_A_STAGE} a stage"
             taken = f"level {level} is used" if level else "its cage is exported, with smooth normals"
             self.report.warn(path, what, f"level {self.level} has {faces[-1]} faces, the bound is {bound}; {taken}")
-        return level
+        if surface is None:
+            return None
+        self._kept[key] = surface
+        while len(self._kept) > 1 and sum(len(kept.counts) for kept in self._kept.values()) > _FACES_KEPT:
+            self._kept.popitem(last=False)
+        return surface
+
+    def _can_be_refined(self, path: object, scheme: str, counts: np.ndarray) -> bool:
+        """Whether the scheme fits faces of so many corners; reported if not."""
+        if scheme not in ("catmullClark", "loop", "bilinear"):
+            self.report.warn(path, "subdivision surface", f"there is no scheme {scheme}; its cage is exported")
+            return False
+        if scheme == "loop" and (counts != 3).any():
+            why = "loop is for triangles alone, and it has other faces; its cage is exported, with smooth normals"
+            self.report.warn(path, "subdivision surface", why)
+            return False
+        return True
+
+    def _faces_by_level(self, scheme: str, counts: np.ndarray) -> list[int]:
+        """Refined faces of levels 0 to `level`; none at 0."""
+        first = 4 * len(counts) if scheme == "loop" else int(counts.sum())
+        return [0, *(first * 4**level for level in range(self.level))]
 
     def _sharpen(self, mesh: UsdGeom.Mesh, topology: Topology, keys: np.ndarray) -> None:
         """Creases and corners as authored; what does not fit the mesh is left out and reported."""

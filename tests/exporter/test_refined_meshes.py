@@ -45,9 +45,11 @@ def test_what_is_not_subdivided_has_the_same_bytes_at_every_complexity(export):
     assert contents(export(text, "--complexity", "low")) == contents(export(text, "--complexity", "veryhigh"))
 
 
-def test_the_surface_is_the_limit_and_authored_normals_are_ignored(gltf):
+def test_the_surface_is_the_limit_and_authored_normals_are_ignored(export):
     authored = 'normal3f[] normals = [(0, 0, 9)] (interpolation = "constant")'
-    scene = gltf(f'def Mesh "M" {{ {CUBE} {authored} }}')
+    result = export(f'def Mesh "M" {{ {CUBE} {authored} }}', "--strict")
+    assert result.noted() == {"authored normals of a subdivision surface are not used"}
+    scene = Gltf(result.path)
     points, normals = scene.attribute("/M", "POSITION"), scene.attribute("/M", "NORMAL")
     assert np.linalg.norm(normals, axis=1) == pytest.approx(np.ones(len(normals)))
     assert np.abs(points).max() == pytest.approx(0.8395061728)
@@ -199,18 +201,43 @@ def test_a_mesh_light_has_the_area_of_its_surface(gltf):
 
 
 def test_too_many_faces_are_refined_less_and_reported(export, monkeypatch):
-    text = f'def Mesh "A" {{ {CUBE} }}\ndef Mesh "B" {{ {CUBE} }}'
+    other = CUBE.replace("(1, 1, 1)", "(1, 1, 2)")
+    text = f'def Mesh "A" {{ {CUBE} }}\ndef Mesh "B" {{ {other} }}\ndef Mesh "C" {{ {CUBE} }}'
     monkeypatch.setattr(subdivision, "MOST_FACES", 50)
     result = export(text)
     assert result.warned() == {"subdivision surface that is refined less"}
-    assert [len(Gltf(result.path).triangles(path)) for path in ("/A", "/B")] == [48, 48]
+    assert [len(Gltf(result.path).triangles(path)) for path in ("/A", "/B", "/C")] == [48, 48, 48]
+    assert [line["path"] for line in result.report["warnings"]] == ["/A", "/B", "/C"]
     assert "level 2 has 96 faces" in result.said()
     monkeypatch.setattr(subdivision, "MOST_FACES", 23)
     assert export(text, "--complexity", "medium").warned() == {"subdivision surface"}
     monkeypatch.setattr(subdivision, "MOST_FACES", 1000)
     monkeypatch.setattr(subdivision, "MOST_FACES_OF_A_STAGE", 100)
     result = export(text, "--complexity", "veryhigh")
-    assert [len(Gltf(result.path).triangles(path)) for path in ("/A", "/B")] == [192, 12]
+    assert [len(Gltf(result.path).triangles(path)) for path in ("/A", "/B", "/C")] == [192, 12, 192]
+
+
+def test_equal_meshes_are_refined_once_and_unequal_ones_are_not_mistaken(export, monkeypatch):
+    made = []
+    monkeypatch.setattr(subdivision, "Surface", lambda *a, make=subdivision.Surface: made.append(a) or make(*a))
+    sharp = f"{TOP} float[] creaseSharpnesses"
+    turned = CUBE + 'uniform token orientation = "leftHanded"'
+    bodies = [CUBE, CUBE, CUBE.replace("(1, 1, 1)", "(1, 1, 2)"), f"{CUBE} {sharp} = [3]", f"{CUBE} {sharp} = [2]", turned, CUBE]
+    result = export("\n".join(f'def Mesh "M{number}" {{ {body} }}' for number, body in enumerate(bodies)))
+    scene = Gltf(result.path)
+    assert len(made) == 5
+    assert result.report["counts"]["subdivision surfaces"] == 7
+    areas = [round(scene.area(f"/M{number}"), 4) for number in range(7)]
+    assert areas[0] == areas[1] == areas[5] == areas[6] and len(set(areas[1:5])) == 4
+    assert (scene.attribute("/M5", "NORMAL") == -scene.attribute("/M0", "NORMAL")).all()
+
+
+def test_points_that_fall_together_have_normals_of_length_one(gltf):
+    flat = CUBE.replace("(-1, -1, -1), (-1, -1, 1), (-1, 1, -1), (-1, 1, 1)", "(0, 0, 0), (0, 0, 0), (0, 0, 0), (0, 0, 0)")
+    everything = CUBE.replace("-1", "0").replace("1", "0").replace("[0, 0, 3", "[0, 1, 3")
+    for text in (flat, everything):
+        normals = gltf(f'def Mesh "M" {{ {text} }}').attribute("/M", "NORMAL")
+        assert np.linalg.norm(normals, axis=1) == pytest.approx(np.ones(len(normals)))
 
 
 def test_animated_creases_are_reported(export):
