@@ -61,7 +61,8 @@ def _parser() -> argparse.ArgumentParser:
                         metavar="/PRIM:SET=NAME", help="variants to select, in this order; or /PRIM{SET=NAME}, "
                         "as Sdf writes it")  # fmt: skip
     parser.add_argument("--mask", type=_mask, default=(), metavar="/PRIM[,/PRIM...]",
-                        help="export these prims alone, what is below them, and what they refer to")  # fmt: skip
+                        help="export these prims alone, what is below them, and what they need: materials, "
+                        "skeletons, prototypes")  # fmt: skip
     parser.add_argument("--purposes", type=_purposes_and_default, default=("default", "render"), metavar="LIST",
                         help="purposes to export beside default, of render,proxy,guide (default: render)")  # fmt: skip
     parser.add_argument("--purpose", type=_purposes, dest="purposes", metavar="LIST",

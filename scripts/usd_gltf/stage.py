@@ -76,8 +76,8 @@ def changes(attribute: Usd.Attribute, frames: Frames) -> bool:
 def open_stage(path: Path, options: Options, report: Notebook) -> Usd.Stage:
     """Open with all payloads, set the variants, populate the mask, and report what did not compose.
 
-    With a mask only its prims are there, what is above and below them, and what their relationships and
-    connections name, as in usdrecord.
+    With a mask only its prims are there, what is above and below them, and what they need to look right: all that
+    their relationships and connections name, except collections and proxies, which name what stands beside them.
     """
     if not path.is_file():
         raise ExportError(f"{path}: no such file")
@@ -95,7 +95,7 @@ def open_stage(path: Path, options: Options, report: Notebook) -> Usd.Stage:
         if not stage.GetPrimAtPath(prim_path):
             raise ExportError(f"{path}: --mask: {_no_prim(path, prim_path)}")
     if options.mask:
-        stage.ExpandPopulationMask()
+        stage.ExpandPopulationMask(lambda link: not link.GetName().startswith("collection:") and link.GetName() != "proxyPrim")
     report_composition(stage, report)
     return stage
 

@@ -32,6 +32,14 @@ def test_a_mask_exports_its_prims_and_what_they_refer_to(gltf):
     assert scene.material("/World/Wall")["pbrMetallicRoughness"]["baseColorFactor"] == [1, 0, 0, 1], "from outside the mask"
 
 
+def test_a_mask_does_not_follow_collections(gltf):
+    linked = SET.replace('def SphereLight "Key" {}', """def SphereLight "Key" (prepend apiSchemas = ["LightAPI"]) {
+            rel collection:lightLink:includes = </World/Floor>
+            uniform bool collection:lightLink:includeRoot = 0
+        }""")
+    assert "/World/Floor" not in gltf(linked, "--mask", "/World/Lamps").by_path
+
+
 def test_a_mask_names_what_is_not_there(export):
     result = export(SET, "--mask", "/World/Lamps/Kay,/World/Wall")
     assert result.code == 1
