@@ -22,17 +22,37 @@ def torn(mesh: Topology, values: np.ndarray, rule: str) -> tuple[Topology, np.nd
     seams.edge_sharpness[inside] = mesh.edge_sharpness[mesh.edge[seams.lead[inside]]]
     vertex = mesh.corners[shown]
     seams.vertex_sharpness = mesh.vertex_sharpness[vertex].copy()
-    seams.vertex_sharpness[_sharp(mesh, seams, vertex, rule)] = INFINITE
+    if rule in ("cornersPlus1", "cornersPlus2"):
+        seams.vertex_sharpness = np.maximum(seams.vertex_sharpness, _beside(mesh, seams, vertex))
+    seams.vertex_sharpness[_fixed(mesh, seams, vertex, rule)] = INFINITE
     return seams, shown
 
 
-def _sharp(mesh: Topology, seams: Topology, vertex: np.ndarray, rule: str) -> np.ndarray:
-    """Which values are fixed; `vertex` is the mesh's vertex of each."""
-    alone = seams.valence == 1
-    sharp = alone & (rule != "none")
+def _on_seam(mesh: Topology, seams: Topology) -> np.ndarray:
+    """(v,) whether a seam runs through or to each vertex of the mesh."""
     split = np.flatnonzero((mesh.twin >= 0) & (seams.twin < 0))
     seam = np.zeros(mesh.vertices, bool)
     seam[mesh.corners[split]] = seam[mesh.corners[mesh.next[split]]] = True
+    return seam
+
+
+def _beside(mesh: Topology, seams: Topology, vertex: np.ndarray) -> np.ndarray:
+    """The sharpness that each value takes over: of two regions that meet at a vertex, one without semi-sharp
+    edges is as sharp as those that run into the other."""
+    inner = np.zeros(len(vertex))
+    semi = (seams.edge_sharpness > 0) & (seams.edge_sharpness < INFINITE)
+    for end in seams.ends:
+        np.maximum.at(inner, end[semi], seams.edge_sharpness[semi])
+    other = np.bincount(vertex, inner, mesh.vertices)[vertex] - inner
+    two = _on_seam(mesh, seams) & (np.bincount(vertex, minlength=mesh.vertices) == 2)
+    return np.where(two[vertex] & (inner == 0), other, 0.0)
+
+
+def _fixed(mesh: Topology, seams: Topology, vertex: np.ndarray, rule: str) -> np.ndarray:
+    """Which values are fixed; `vertex` is the mesh's vertex of each."""
+    alone = seams.valence == 1
+    sharp = alone & (rule != "none")
+    seam = _on_seam(mesh, seams)
     border = mesh.incident(boundaries(mesh)) > 0
     values = np.bincount(vertex, minlength=mesh.vertices)
     if rule == "boundaries":
@@ -47,12 +67,4 @@ def _sharp(mesh: Topology, seams: Topology, vertex: np.ndarray, rule: str) -> np
             sharp |= (seam & ~border & (values == 1))[vertex]
         beside = np.bincount(vertex[broken], minlength=mesh.vertices) > 0
         sharp |= (seam & ((values > 2) | ((values == 2) & beside)))[vertex]
-        # Of two regions one is as sharp as the semi-sharp edges that run into the other.
-        inner = np.zeros(len(vertex))
-        semi = (seams.edge_sharpness > 0) & (seams.edge_sharpness < INFINITE)
-        for end in seams.ends:
-            np.maximum.at(inner, end[semi], seams.edge_sharpness[semi])
-        other = np.bincount(vertex, inner, mesh.vertices)[vertex] - inner
-        some = (seam & (values == 2))[vertex] & (inner == 0)
-        seams.vertex_sharpness[some] = np.maximum(seams.vertex_sharpness, other)[some]
     return sharp

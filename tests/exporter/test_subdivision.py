@@ -145,10 +145,11 @@ class TestLaws:
         vertices = np.arange(len(points))
         corners = np.concatenate(faces)
         for kind in ("vertex", "varying"):
+            total = 0.0
             for vertex in vertices:
                 one = CornerValues((vertices == vertex).astype(float)[:, None], corners, interpolation=kind)
                 part = found.carry(one).values
-                total = part if vertex == 0 else total + part
+                total = total + part
                 assert part.max() <= 1 + 1e-12
             assert total == pytest.approx(np.ones_like(total))
 
@@ -285,6 +286,24 @@ def test_opensubdivs_own_face_varying_values(rule, indexed):
     wanted = np.array(golden["values"][rule])
     # Smooth corners of the boundary are OpenSubdiv's own approximation there.
     assert st.values[st.index] == pytest.approx(wanted, abs=1e-4 if rule == "none" else 1.2e-5)
+
+
+def test_a_region_beside_a_semi_sharp_one_is_as_sharp():
+    """Of two regions that meet along a line, one has a crease that ends at it: both all but stay there (cornersPlus1)."""
+    places, faces = grid(4, 2)
+    flat = np.pad(np.array(places, dtype=float), ((0, 0), (0, 1)))
+    index = np.concatenate(faces)
+    values = np.concatenate([flat[:, :2], flat[:, :2] + 9])
+    right = np.repeat(np.arange(8) % 2 == 1, 4)  # a seam along the middle of the long side
+
+    def moved(rule, sharpness):
+        found = surface(flat, faces, 1, creases=[[6, 7, sharpness]], face_varying=rule)
+        st = found.carry(CornerValues(values**2, index + len(flat) * right, interpolation="faceVarying", indexed=True))
+        return [np.linalg.norm(st.values - place, axis=1).min() for place in ((4, 1), (121, 100))]
+
+    assert moved("cornersPlus1", 0) == pytest.approx([1 / 3, 1 / 3])
+    assert moved("cornersOnly", 3) == pytest.approx([moved("cornersPlus1", 3)[0], 1 / 3])
+    assert moved("cornersPlus1", 3) == pytest.approx([1 / 24, 1 / 24]), "the kink halves at each level that it stays sharp"
 
 
 def test_values_without_seams_are_vertex_values():
