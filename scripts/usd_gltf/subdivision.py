@@ -202,7 +202,7 @@ class Subdivider:
         if surface is None:
             return None
         self._kept[key] = surface
-        while len(self._kept) > 1 and sum(len(kept.counts) for kept in self._kept.values()) > _FACES_KEPT:
+        while sum(len(kept.counts) for kept in self._kept.values()) > _FACES_KEPT:
             self._kept.popitem(last=False)
         return surface
 
