@@ -17,6 +17,8 @@ A tour, in the order of the work:
 `light_textures`    the pictures of rect lights and domes
 `pictures`, `baking`, `asset_files`     picture files into arrays, light of any range into a PNG
 `mesh`, `triangulate`, `primvars`, `gprims`     geometry
+`skinning`          poses of skeletons and blend shapes
+`subdivision`, `subdivision_topology`, `subdivision_masks`, `subdivision_normals`, `subdivision_seams`   smooth surfaces
 `materials`, `preview_surface`, `textures`      looks
 `instancers`, `cameras`, `fog`, `transforms`, `animation`
 `gltf_document`     buffers, accessors, JSON, files

@@ -12,7 +12,7 @@ import sys
 import traceback
 from pathlib import Path
 
-from pxr import Tf, UsdUtils
+from pxr import Sdf, Tf, UsdUtils
 
 from .events import tell_up_to_date
 from .export import export
@@ -20,6 +20,7 @@ from .whole_file import write_atomically
 from .report import CATEGORIES, ExportError
 from .source_hash import recorded_hash, up_to_date
 from .stage import Options, first_line
+from .subdivision import LEVELS
 
 _PURPOSES = ("default", "render", "proxy", "guide")
 
@@ -57,11 +58,20 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--frames", type=_frames, metavar="A-B",
                         help="frames (time codes) to export; default: the stage's")  # fmt: skip
     parser.add_argument("--variant", nargs="+", action="extend", default=[], type=_variant,
-                        metavar="/PRIM{SET=SELECTION}", help="variant selections")  # fmt: skip
-    parser.add_argument("--purpose", type=_purposes, default=("default", "render"), metavar="LIST",
-                        help="purposes to export, of default,render,proxy,guide (default: default,render)")  # fmt: skip
+                        metavar="/PRIM:SET=NAME", help="variants to select, in this order; or /PRIM{SET=NAME}, "
+                        "as Sdf writes it")  # fmt: skip
+    parser.add_argument("--mask", type=_mask, default=(), metavar="/PRIM[,/PRIM...]",
+                        help="export these prims alone, what is below them, and what they need: materials, "
+                        "skeletons, prototypes")  # fmt: skip
+    parser.add_argument("--purposes", type=_purposes_and_default, default=("default", "render"), metavar="LIST",
+                        help="purposes to export beside default, of render,proxy,guide (default: render)")  # fmt: skip
+    parser.add_argument("--purpose", type=_purposes, dest="purposes", metavar="LIST",
+                        help="the same, of default,render,proxy,guide: `default` only if it is named")  # fmt: skip
     parser.add_argument("--normalize-area", choices=("stage", "metre"), default="stage",
                         help="unit of the area that `normalize` divides by (default: stage)")  # fmt: skip
+    parser.add_argument("--complexity", choices=tuple(LEVELS), default="high",
+                        help="how far subdivision surfaces are refined, as in usdrecord: 0, 1, 2 or 3 times "
+                        "(default: high)")  # fmt: skip
     # `--strict` alone stands for all categories (`main` spells it out), so that it never takes the
     # word after it for its list.
     parser.add_argument("--strict", type=_categories, default=(), metavar="[=LIST]",
@@ -89,10 +99,26 @@ def _frames(text: str) -> tuple[int, int]:
 
 
 def _variant(text: str) -> tuple[str, str, str]:
-    match = re.fullmatch(r"(/[^{}]+)\{([^{}=]+)=([^{}=]*)\}", text)
-    if not match:
-        raise argparse.ArgumentTypeError(f"'{text}' is no variant selection; write /Prim{{set=selection}}")
-    return match[1], match[2], match[3]
+    match = re.fullmatch(r"(/[^{}:]+)(?:\{([^{}=]+)=([^{}=]*)\}|:([^{}=]+)=([^{}=]*))", text)
+    if not match or not _is_prim(match[1]):
+        raise argparse.ArgumentTypeError(f"'{text}' is no variant selection; write /Prim:set=name")
+    return match[1], match[2] or match[4], match[5] if match[3] is None else match[3]
+
+
+def _mask(text: str) -> tuple[str, ...]:
+    chosen = tuple(word.strip() for word in text.split(","))
+    for word in chosen:
+        if not _is_prim(word):
+            raise argparse.ArgumentTypeError(f"'{word}' is no path of a prim; write /World/Lamps")
+    return tuple(sorted(set(chosen)))
+
+
+def _is_prim(text: str) -> bool:
+    return Sdf.Path.IsValidPathString(text) and Sdf.Path(text).IsAbsolutePath() and Sdf.Path(text).IsPrimPath()
+
+
+def _purposes_and_default(text: str) -> tuple[str, ...]:
+    return tuple(sorted({*_purposes(text), "default"}))
 
 
 def _purposes(text: str) -> tuple[str, ...]:
@@ -117,8 +143,10 @@ def _run(arguments: argparse.Namespace) -> int:
     options = Options(
         frames=arguments.frames,
         variants=tuple(arguments.variant),
-        purposes=arguments.purpose,
+        purposes=arguments.purposes,
+        mask=arguments.mask,
         normalize_area=arguments.normalize_area,
+        complexity=arguments.complexity,
     )
     if not source.is_file():
         raise ExportError(f"{source}: no such file")

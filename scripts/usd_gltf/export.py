@@ -18,6 +18,7 @@ from .node_writer import NodeWriter, root_node
 from .preview_surface import PreviewSurfaces
 from .prim_tree import PrimTree
 from .report import Report
+from .skinning import Skinning
 from .source_hash import Dependencies
 from .stage import Frames, Options, choose_frames, open_stage
 from .textures import Textures
@@ -51,7 +52,8 @@ def export(source: Path, output: Path, options: Options) -> Exported:
     textures = Textures(document, dependencies, frames.first, report.about("materials"))
     surfaces = PreviewSurfaces(textures, frames, report.about("materials"))
     materials = Materials(document, surfaces.read, report.about("materials"))
-    meshes = MeshReader(document, materials, frames, report.about("geometry"))
+    skinning = Skinning(stage, frames, report.about("geometry"))
+    meshes = MeshReader(document, materials, skinning, frames, options.complexity, report.about("geometry"))
     tree = PrimTree(stage, meshes, frames, options.purposes, meters_per_unit, report.about("geometry"))
     pictures = LightTextures(document, dependencies, frames, report.about("lights"))
     carriers = LightCarriers(

@@ -4,13 +4,14 @@ A mesh is cut into pieces, one for each material (GeomSubset). Corners with equa
 texture coordinates and colour share a vertex. Texture coordinates are turned over: USD's v runs up
 from the image's last row, glTF's down from its first.
 
-A subdivision surface is exported as its cage, with smooth normals (weighted by area) if it has none
-of its own, and reported. A polygon mesh without normals has none in glTF either: flat shading.
+A subdivision surface is refined (`subdivision`); at complexity low its cage is exported, with smooth normals
+(weighted by area) if it has none of its own, and reported. A polygon mesh without normals has none in glTF
+either: flat shading.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from pxr import Usd, UsdGeom, UsdShade
@@ -21,7 +22,9 @@ from .light_inputs import Light
 from .materials import Emission, Look, Materials
 from .primvars import CornerValues, as_rows, read_normals, read_primvar
 from .report import Notebook
+from .skinning import Skinning
 from .stage import Frames, changes
+from .subdivision import Subdivider, Surface
 from .triangulate import triangulate
 
 GLOW = "materialGlowTintsLight"
@@ -46,6 +49,18 @@ class Piece:
     """A display colour for the whole piece; one that varies is in `COLOR_0`."""
     translucent: bool
     """Whether a display opacity is below 1."""
+
+
+@dataclass
+class Authored:
+    """A mesh as it is authored, which its primvars are read against, and the surface that is made of it."""
+
+    prim: Usd.Prim
+    counts: np.ndarray
+    corners: np.ndarray
+    surface: Surface | None = None
+    carried: dict[tuple[str, int], CornerValues] = field(default_factory=dict)
+    """Primvars that are on the surface already: the pieces of a mesh share them."""
 
 
 @dataclass
@@ -116,9 +131,18 @@ class MeshSource:
 class MeshReader:
     """Reads meshes once: what USD shares (instances) or repeats is stored once."""
 
-    def __init__(self, document: Document, materials: Materials, frames: Frames, report: Notebook) -> None:
-        self.document, self.materials = document, materials
+    def __init__(
+        self,
+        document: Document,
+        materials: Materials,
+        skinning: Skinning,
+        frames: Frames,
+        complexity: str,
+        report: Notebook,
+    ) -> None:
+        self.document, self.materials, self.skinning = document, materials, skinning
         self.frames, self.code, self.report = frames, frames.first, report
+        self.subdivider = Subdivider(complexity, frames, report)
         self._read: dict[tuple, MeshSource | None] = {}
 
     def read(self, prim: Usd.Prim) -> MeshSource | None:
@@ -127,7 +151,7 @@ class MeshReader:
         bound = [self.materials.bound(p) for p in (prim, *subsets)]
         color = self._inherited_color(prim)
         source = prim.GetPrimInPrototype() if prim.IsInstanceProxy() else prim
-        key = (source.GetPath(), tuple(look.path for look in bound), color)
+        key = (source.GetPath(), tuple(look.path for look in bound), color, self.skinning.name(prim))
         if key not in self._read:
             self._read[key] = self._build(prim, subsets, bound)
         return self._read[key]
@@ -149,23 +173,34 @@ class MeshReader:
         points = np.where(np.abs(points) < 3e38, points, np.nan)
         if not np.isfinite(points).all():
             self.report.warn(prim.GetPath(), "points that are not finite", "faces that use them are left out")
+        authored, surface = Authored(prim, counts, corners), None
+        if prim.GetTypeName() not in gprims.TYPES:
+            surface = authored.surface = self.subdivider.surface(prim, points, counts, corners)
+        owner = np.zeros(len(counts), int)
+        if surface is not None:
+            points, counts, corners = surface.points, surface.counts, surface.corners
+            if normals and surface.normals:
+                why = "UsdGeom gives them no meaning; a mesh of polygons has subdivisionScheme = none"
+                self.report.note(prim.GetPath(), "authored normals of a subdivision surface are not used", why)
+            normals = surface.normals or (normals and surface.carry(normals))
         with np.errstate(invalid="ignore", over="ignore"):  # the faces of such points go below
-            triangles, faces = triangulate(points, counts, corners)
-        keep = ~np.isin(faces, self._holes(prim))
+            triangles, faces = triangulate(points, counts, corners) if surface is None else surface.triangles
+        hidden = np.zeros(len(counts), bool) if surface is None else surface.hidden
+        parents = faces if surface is None else surface.parents[faces]
+        keep = ~(np.isin(parents, self._holes(prim)) | hidden[faces])
         keep &= np.isfinite(points).all(axis=1)[corners[triangles]].all(axis=1)
-        triangles, faces = triangles[keep], faces[keep]
+        triangles, parents = triangles[keep], parents[keep]
         if not len(triangles):
             self.report.warn(prim.GetPath(), "mesh without faces", "it is left out")
             return None
         points = np.where(np.isfinite(points), points, 0.0)
         if prim.GetAttribute("orientation").Get() == UsdGeom.Tokens.leftHanded:
             triangles = triangles[:, ::-1]
-        if normals is None and self._is_cage(prim):
+        if normals is None and surface is None and self._is_cage(prim):
             normals = _smooth_normals(points, corners, triangles)
         if normals is not None:
             normals = _unit(normals, points, corners, triangles)
 
-        owner = np.zeros(int(counts.size), int)
         for number, subset in enumerate(subsets, start=1):
             members = as_rows(UsdGeom.Subset(subset).GetIndicesAttr().Get(self.code), 1, int)
             inside = (members >= 0) & (members < len(owner))
@@ -176,9 +211,9 @@ class MeshReader:
         double_sided = bool(prim.GetAttribute("doubleSided").Get(self.code) or False)
         pieces = []
         for number, look in enumerate(bound):
-            chosen = triangles[owner[faces] == number]
+            chosen = triangles[owner[parents] == number]
             if len(chosen):
-                piece = self._piece(prim, look, double_sided, points, counts, corners, normals, chosen)
+                piece = self._piece(authored, look, double_sided, points, corners, normals, chosen)
                 if number:
                     piece.primitive["extras"] = {"usdPath": str(subsets[number - 1].GetPath())}
                 pieces.append(piece)
@@ -216,9 +251,9 @@ class MeshReader:
             why = f"faceVertexIndices run from {corners.min()} to {corners.max()}, points are {len(points)}"
             self.report.warn(path, "mesh with a broken topology", f"{why}; it is left out")
             return None
-        if prim.HasRelationship("skel:skeleton") or prim.GetAttribute("primvars:skel:jointIndices").HasAuthoredValue():
-            self.report.warn(path, "skinned mesh", "UsdSkel has no carrier; the mesh is exported as its points stand")
-        return points, counts, corners, read_normals(prim, self.code, counts, corners, self.report)
+        normals = read_normals(prim, self.code, counts, corners, self.report)
+        points, normals = self.skinning.pose(prim, points, corners, normals)
+        return points, counts, corners, normals
 
     def _holes(self, prim: Usd.Prim) -> np.ndarray:
         attribute = prim.GetAttribute("holeIndices")
@@ -229,18 +264,17 @@ class MeshReader:
         if prim.GetTypeName() in gprims.TYPES:
             return False
         scheme = UsdGeom.Mesh(prim).GetSubdivisionSchemeAttr().Get()
-        if scheme == UsdGeom.Tokens.none:
+        if scheme == UsdGeom.Tokens.none or (scheme == UsdGeom.Tokens.bilinear and self.subdivider.level):
             return False
         self.report.warn(prim.GetPath(), "subdivision surface", f"{scheme}: its cage is exported, with smooth normals")
         return True
 
     def _piece(
         self,
-        prim: Usd.Prim,
+        mesh: Authored,
         look: Look,
         double_sided: bool,
         points: np.ndarray,
-        counts: np.ndarray,
         corners: np.ndarray,
         normals: CornerValues | None,
         triangles: np.ndarray,
@@ -250,14 +284,14 @@ class MeshReader:
         if normals is not None:
             values["NORMAL"] = normals
         for number, name in enumerate(look.uv_names):
-            uv = read_primvar(prim, name, 2, self.code, counts, corners, self.report)
+            uv = self._primvar(mesh, name, 2)
             if uv is None:
                 why = f"{look.path} reads primvars:{name}; (0, 0) is used"
-                self.report.warn(prim.GetPath(), "mesh without the texture coordinates of its material", why)
+                self.report.warn(mesh.prim.GetPath(), "mesh without the texture coordinates of its material", why)
                 uv = CornerValues(np.zeros((1, 2)), np.zeros(len(corners), int))
-            values[f"TEXCOORD_{number}"] = CornerValues(uv.values * [1, -1] + [0, 1], uv.index)
+            values[f"TEXCOORD_{number}"] = replace(uv, values=uv.values * [1, -1] + [0, 1])
         tint, translucent = None, False
-        color = self._display_color(prim, counts, corners) if look.uses_display_color else None
+        color = self._display_color(mesh, corners) if look.uses_display_color else None
         if color is not None:
             translucent = bool((color.values[:, 3] < 1.0).any())
             if color.constant:
@@ -268,10 +302,18 @@ class MeshReader:
         primitive = self._primitive(points, corners, values, triangles)
         return Piece(primitive, look, double_sided, tint, translucent)
 
-    def _display_color(self, prim: Usd.Prim, counts: np.ndarray, corners: np.ndarray) -> CornerValues | None:
+    def _primvar(self, mesh: Authored, name: str, width: int) -> CornerValues | None:
+        """A primvar on the corners of the mesh, or of its refined surface; None if there is none."""
+        if (name, width) in mesh.carried:
+            return mesh.carried[name, width]
+        found = read_primvar(mesh.prim, name, width, self.code, mesh.counts, mesh.corners, self.report)
+        if found is not None and mesh.surface is not None:
+            found = mesh.carried[name, width] = mesh.surface.carry(found)
+        return found
+
+    def _display_color(self, mesh: Authored, corners: np.ndarray) -> CornerValues | None:
         """displayColor and displayOpacity as linear RGBA."""
-        color = read_primvar(prim, "displayColor", 3, self.code, counts, corners, self.report)
-        opacity = read_primvar(prim, "displayOpacity", 1, self.code, counts, corners, self.report)
+        color, opacity = self._primvar(mesh, "displayColor", 3), self._primvar(mesh, "displayOpacity", 1)
         if color is None and opacity is None:
             return None
         one = CornerValues(np.ones((1, 1)), np.zeros(len(corners), int), True)
@@ -279,7 +321,7 @@ class MeshReader:
         color, opacity = color or grey, opacity or one
         if opacity.constant:
             alpha = np.full((len(color.values), 1), opacity.values[opacity.index[0], 0])
-            both = CornerValues(np.hstack([color.values, alpha]), color.index, color.constant)
+            both = CornerValues(np.hstack([color.values, alpha]), color.index, color.constant, exact=color.exact)
         else:
             rgba = np.hstack([color.values[color.index], opacity.values[opacity.index]])
             both = CornerValues(rgba, np.arange(len(corners)))
@@ -294,7 +336,9 @@ class MeshReader:
         key = corners[used]
         for found in values.values():
             index = found.index[used]
-            if found.index is not corners:
+            if found.exact and found.index is not corners:
+                key = _paired(key, index)
+            elif found.index is not corners:
                 key = _refined(key, found.values.astype(np.float32)[index])
         _, first, index = np.unique(key, return_index=True, return_inverse=True)
         vertex = used[first]
@@ -314,6 +358,14 @@ def _material_subsets(prim: Usd.Prim) -> list[Usd.Prim]:
         return []
     found = UsdShade.MaterialBindingAPI(prim).GetMaterialBindSubsets() if imageable else []
     return [s.GetPrim() for s in found if s.GetElementTypeAttr().Get() == UsdGeom.Tokens.face]
+
+
+def _paired(key: np.ndarray, index: np.ndarray) -> np.ndarray:
+    """Keys that tell apart what `key` does and, besides, different indices."""
+    width = int(index.max(initial=0)) + 1
+    if int(key.max(initial=0)) >= (1 << 62) // width:
+        _, key = np.unique(key, return_inverse=True)
+    return key * width + index
 
 
 def _refined(key: np.ndarray, rows: np.ndarray) -> np.ndarray:
@@ -345,7 +397,13 @@ def _unit(normals: CornerValues, points: np.ndarray, corners: np.ndarray, triang
     """Unit normals. Where one is zero, the geometric one at its point, and at worst +Z."""
     length = np.linalg.norm(normals.values, axis=1, keepdims=True)
     if (length > 0).all():
-        return CornerValues(normals.values / length, normals.index)
+        return replace(normals, values=normals.values / length)
+    if normals.exact:
+        place = np.zeros(len(length), int)
+        place[normals.index] = corners
+        geometric = np.where(length > 0, normals.values, _area_normals(points, corners, triangles)[place])
+        length = np.linalg.norm(geometric, axis=1, keepdims=True)
+        return replace(normals, values=np.where(length > 0, geometric / np.where(length > 0, length, 1.0), [0.0, 0.0, 1.0]))
     spread = normals.values[normals.index]
     geometric = _area_normals(points, corners, triangles)[corners]
     spread = np.where(np.linalg.norm(spread, axis=1, keepdims=True) > 0, spread, geometric)

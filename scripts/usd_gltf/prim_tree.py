@@ -126,6 +126,10 @@ class PrimTree:
             _insert(compiled, _POLE_Z)
         if compiled.light is not None and compiled.light.stretch is not None:
             _insert(compiled, compiled.light.stretch)
+        if compiled.mesh is not None:
+            movement = self.meshes.skinning.movement(prim)
+            if movement is not None:
+                _insert(compiled, movement)
         if compiled.is_empty:
             return None
         compiled.lit = (
@@ -169,7 +173,7 @@ class PrimTree:
             compiled.light = self._light(prim, light_type(prim))
         elif prim.IsA(UsdLux.LightFilter):
             self.lights.warn(path, kind, "light filters have no carrier")
-        elif compiled.fog is None and (prim.IsA(UsdGeom.Gprim) or kind in ("Skeleton", "Volume")):
+        elif compiled.fog is None and (prim.IsA(UsdGeom.Gprim) or kind == "Volume"):
             self.report.warn(path, kind, "this kind of geometry has no carrier; it is left out")
         elif kind and not prim.GetPrimTypeInfo().GetSchemaType():
             report = self.lights if "Light" in kind else self.report.about("other")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from pxr import Usd, UsdGeom
@@ -17,6 +17,11 @@ class CornerValues:
     values: np.ndarray
     index: np.ndarray
     constant: bool = False
+    interpolation: str = ""
+    indexed: bool = False
+    """Whether the author gave indices, which then say where face-varying values are one."""
+    exact: bool = False
+    """Whether equal values have equal indices, so that indices alone tell vertices apart."""
 
 
 def as_rows(value, width: int, kind: type = float) -> np.ndarray:
@@ -47,7 +52,7 @@ def spread(
         index = indices[index]
     if len(index) and (index.max() >= len(values) or index.min() < 0):
         return None
-    return CornerValues(values, index, interpolation == "constant")
+    return CornerValues(values, index, interpolation == "constant", interpolation, indices is not None)
 
 
 def read_primvar(
@@ -92,4 +97,4 @@ def read_normals(
 def finite(found: CornerValues) -> CornerValues:
     """The same with 0 for what is not finite (or overflows single precision)."""
     good = np.isfinite(found.values) & (np.abs(found.values) < 3e38)
-    return CornerValues(np.where(good, found.values, 0.0), found.index, found.constant)
+    return replace(found, values=np.where(good, found.values, 0.0))

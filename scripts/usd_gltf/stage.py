@@ -22,6 +22,10 @@ PROTOTYPE_PREDICATE = Usd.TraverseInstanceProxies(Usd.PrimIsActive & Usd.PrimIsL
 """What of a PointInstancer's prototype is scene: it may be an `over` or a `class`."""
 
 
+_NAMES_SHOWN = 20
+_EVERYTHING = Usd.TraverseInstanceProxies(Usd.PrimAllPrimsPredicate)
+
+
 @dataclass(frozen=True)
 class Options:
     """The user's choices that change the exported file."""
@@ -29,7 +33,9 @@ class Options:
     frames: tuple[int, int] | None = None
     variants: tuple[tuple[str, str, str], ...] = ()
     purposes: tuple[str, ...] = ("default", "render")
+    mask: tuple[str, ...] = ()
     normalize_area: str = "stage"
+    complexity: str = "high"
 
 
 @dataclass(frozen=True)
@@ -68,24 +74,55 @@ def changes(attribute: Usd.Attribute, frames: Frames) -> bool:
 
 
 def open_stage(path: Path, options: Options, report: Notebook) -> Usd.Stage:
-    """Open with all payloads, set the variants, and report what did not compose."""
+    """Open with all payloads, set the variants, populate the mask, and report what did not compose.
+
+    With a mask only its prims are there, what is above and below them, and what they need to look right: all that
+    their relationships and connections name, except collections and proxies, which name what stands beside them.
+    """
     if not path.is_file():
         raise ExportError(f"{path}: no such file")
     try:
-        stage = Usd.Stage.Open(str(path), Usd.Stage.LoadAll)
+        if options.mask:
+            mask = Usd.StagePopulationMask([Sdf.Path(prim) for prim in options.mask])
+            stage = Usd.Stage.OpenMasked(str(path), mask, Usd.Stage.LoadAll)
+        else:
+            stage = Usd.Stage.Open(str(path), Usd.Stage.LoadAll)
     except (Tf.ErrorException, RuntimeError) as error:
         raise ExportError(f"{path}: USD cannot read it: {first_line(error, path)}") from None
     for prim_path, variant_set, selection in options.variants:
         _select_variant(stage, path, prim_path, variant_set, selection)
+    for prim_path in options.mask:
+        if not stage.GetPrimAtPath(prim_path):
+            raise ExportError(f"{path}: --mask: {_no_prim(path, prim_path)}")
+    if options.mask:
+        stage.ExpandPopulationMask(lambda link: not link.GetName().startswith("collection:") and link.GetName() != "proxyPrim")
     report_composition(stage, report)
     return stage
 
 
+def _no_prim(file: Path, prim_path: str) -> str:
+    """Why a prim is not there, and what the last prim on the way to it has instead."""
+    stage = Usd.Stage.Open(str(file), Usd.Stage.LoadAll)
+    if stage.GetPrimAtPath(prim_path):
+        return f"{prim_path} is outside the prims of --mask"
+    above = Sdf.Path(prim_path).GetParentPath()
+    while not stage.GetPrimAtPath(above):
+        above = above.GetParentPath()
+    names = [child.GetName() for child in stage.GetPrimAtPath(above).GetFilteredChildren(_EVERYTHING)]
+    shown = ", ".join(names[:_NAMES_SHOWN]) + (f", and {len(names) - _NAMES_SHOWN} more" if len(names) > _NAMES_SHOWN else "")
+    return f"there is no prim {prim_path} ({above} has: {shown or 'none'})"
+
+
 def _select_variant(stage: Usd.Stage, file: Path, prim_path: str, name: str, selection: str) -> None:
     """Select a variant in the session layer."""
-    prim = stage.GetPrimAtPath(prim_path) if Sdf.Path.IsValidPathString(prim_path) else None
+    prim = stage.GetPrimAtPath(prim_path)
     if not prim:
-        raise ExportError(f"{file}: --variant: there is no prim {prim_path}")
+        raise ExportError(f"{file}: --variant: {_no_prim(file, prim_path)}")
+    if prim.IsInstanceProxy():
+        instance = prim
+        while not instance.IsInstance():
+            instance = instance.GetParent()
+        raise ExportError(f"{file}: --variant: {prim_path} is inside the instance {instance.GetPath()}; select on that, or above")
     if name not in prim.GetVariantSets().GetNames():
         known = ", ".join(prim.GetVariantSets().GetNames()) or "none"
         raise ExportError(f"{file}: --variant: {prim_path} has no variant set '{name}' (it has: {known})")
