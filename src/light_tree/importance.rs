@@ -1,9 +1,12 @@
-//! How much light a cluster may send to a receiver: an unnormalised weight.
+//! How much light a cluster is likely to send to a receiver: an unnormalised weight.
 //!
 //! HPG 2018, equation 3: `E cos'(theta - theta_o - theta_u) cos'(theta_i - theta_u) / d^2`, with
 //! `theta_u` the half angle under which the receiver sees the box's bounding *sphere* (its corners
-//! underestimate). Two departures from the paper:
+//! underestimate). Three departures from the paper:
 //!
+//! - The paper's cosines are the largest that any emitter of the cluster can have. They decide what is
+//!   dark. What is not is weighed by the cosines that are [expected](expected) of emitters spread over the
+//!   box and of normals spread over the cone: most of a wide cone faces away, whatever its edge does.
 //! - The distance is `d^2 + r^2/10` with `r` the sphere's radius: no kink and no pole where the
 //!   receiver is inside, and in units of length squared, so that the scale of the scene cancels.
 //! - Importance 0 means that no light can arrive, so it is returned only beyond a [slack](EDGE_SLACK)
@@ -27,6 +30,10 @@ const HORIZON_SLACK: f32 = 1e-5;
 const EDGE_SLACK: f32 = 1e-3;
 /// The least value of a cosine factor that is not provably zero.
 const FLOOR: f32 = 1e-4;
+/// The least share of the largest cosine that is expected: emitters are not spread evenly.
+const LEAST_EXPECTED: f32 = 0.02;
+/// The mean of a square coordinate over a box, as a share of the square of its half edge.
+const MEAN_SQUARE: f32 = 1.0 / 3.0;
 /// The share of the sphere's squared radius that softens the squared distance.
 pub(super) const SOFTENING: f32 = 0.1;
 /// Allowance for the relative rounding error of squared distances and ranges.
@@ -104,6 +111,24 @@ impl Cluster {
         (if is_dark { 0.0 } else { emission }, cos_o)
     }
 
+    /// The share that is expected to leave at some angle off the axis, given by its cosine: `emission` is the
+    /// largest. Normals are spread evenly over the cone. `offset2` is the mean square of the directions to emitters
+    /// across that to the centre. Where light leaves in every direction, nothing is known of normals.
+    #[inline(always)]
+    fn expected_emission(&self, emission: f32, cosine: f32, cos_o: f32, offset2: f32) -> f32 {
+        // Mean and variance of the cosine between a direction and a unit vector spread over a cap.
+        let mean = cosine * 0.5 * (1.0 + cos_o);
+        let along = (1.0 + cos_o + cos_o * cos_o) * (1.0 / 3.0);
+        let across = 0.5 * (1.0 - along);
+        let square = along * cosine * cosine + across * (1.0 - cosine * cosine) + offset2;
+        let half = (3.0 * (square - mean * mean).max(0.0)).sqrt();
+        let back = if self.two_sided { expected(-mean, half) } else { 0.0 };
+        // Of beams narrower than a hemisphere, fewer reach any one point.
+        let beam = (2.0 * (1.0 - self.cos_theta_e) / (1.0 - cos_o).max(1e-9)).min(1.0);
+        let share = ((expected(mean, half) + back) * beam).max(LEAST_EXPECTED * emission);
+        if cos_o > -1.0 { share } else { emission }
+    }
+
     /// The share of light that the range leaves at a squared distance, m^2; 0 only surely out of range.
     #[inline(always)]
     pub fn window(&self, nearest2: f32) -> f32 {
@@ -149,7 +174,7 @@ pub(super) fn spread(r2: f32, d2: f32, cos_o: f32, cos_e: f32) -> f32 {
 pub struct Sight {
     /// Unit, towards the centre.
     pub to: [f32; 3],
-    /// The largest cosine that any direction of the cone has with the normal; above zero.
+    /// The cosine with the normal that is expected of light from the cluster; above zero.
     pub cosine: f32,
     /// Cosine and sine of the cone's half angle, which is a right angle inside the sphere.
     pub cos_u: f32,
@@ -162,6 +187,14 @@ impl Sight {
     pub fn one_minus_cos_u(&self) -> f32 {
         self.sin_u * self.sin_u / (1.0 + self.cos_u)
     }
+}
+
+/// The mean of a cosine that is spread evenly over a mean and `half` to either side, with 0 for all that is
+/// below 0.
+#[inline(always)]
+fn expected(mean: f32, half: f32) -> f32 {
+    let high = (mean + half).max(0.0);
+    if mean >= half { mean } else { high * high / (4.0 * half).max(f32::MIN_POSITIVE) }
 }
 
 /// The factors of the importance, which is energy times product over decay. They leave out what becomes
@@ -198,14 +231,23 @@ pub(super) fn factors(cluster: &Cluster, receiver: &Receiver) -> Factors {
     let across = (wx * wx + wy * wy + wz * wz).sqrt() * inverse;
     let (emission, cos_o) = cluster.emission((along, across), inside, (sin_u, cos_u));
     let is_dark = emission == 0.0;
+    // Points of the box are at this distance, in the quadratic mean.
+    let mean_d2 = d2 + MEAN_SQUARE * r2;
+    let inverse_mean = if mean_d2 > 0.0 { 1.0 / mean_d2.sqrt() } else { 0.0 };
+    let offset2 = MEAN_SQUARE * MEAN_SQUARE * r2 * inverse_mean * inverse_mean;
+    let emission = cluster.expected_emission(emission, along * d * inverse_mean, cos_o, offset2);
 
-    // Reception: the largest cosine that any point of the sphere can have. Without a normal every
-    // direction counts alike.
+    // Reception: the largest cosine that any point of the sphere can have, or from outside the one that is
+    // expected of the box. Inside, what is near decides, wherever that is. Without a normal every direction
+    // counts alike.
     let in_medium = (nx == 0.0) & (ny == 0.0) & (nz == 0.0);
     let cosine_i = (-below * inverse_d).clamp(-1.0, 1.0);
     let sine_i = (1.0 - cosine_i * cosine_i).sqrt();
     let best = if cosine_i >= cos_u { 1.0 } else { cosine_i * cos_u + sine_i * sin_u };
-    let cosine = if inside | in_medium { 1.0 } else { best.max(FLOOR) };
+    let expected = expected(-below * inverse_mean, reach * inverse_mean).max(LEAST_EXPECTED * best);
+    let near = sin_u * sin_u * sin_u * sin_u;
+    let likely = (expected + near * (best - expected)).max(FLOOR);
+    let cosine = if inside | in_medium { 1.0 } else { likely };
     let to = [-vx * inverse_d, -vy * inverse_d, -vz * inverse_d];
 
     // Range: at the point of the box that is nearest.

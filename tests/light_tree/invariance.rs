@@ -218,7 +218,7 @@ proptest! {
 fn the_unit_of_lengths_hardly_shows() {
     for exponent in [-6, -3, -1, 1, 3, 6] {
         let apart = worst_by_scale(10f32.powi(exponent));
-        assert!(apart < 0.03, "1e{exponent}: {apart}");
+        assert!(apart < 0.04, "1e{exponent}: {apart}");
     }
 }
 
@@ -233,7 +233,7 @@ fn the_unit_of_energies_does_not_show() {
 #[test]
 fn the_place_of_the_origin_hardly_shows() {
     for (shift, exact, allowed) in
-        [(1e3, true, 1e-3), (1e3, false, 5e-3), (1e4, true, 1e-3), (1e5, true, 1e-3)]
+        [(1e3, true, 2e-3), (1e3, false, 5e-3), (1e4, true, 2e-3), (1e5, true, 2e-3)]
     {
         let apart = worst_by_shift(shift, exact);
         assert!(apart < allowed, "{shift}, {exact}: {apart}");

@@ -3,6 +3,7 @@
 mod build;
 mod city;
 mod darkness;
+mod expected;
 mod extremes;
 mod frames;
 mod glossy;
