@@ -11,6 +11,7 @@ of its own, and reported. A polygon mesh without normals has none in glTF either
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from pxr import Usd, UsdGeom, UsdShade
@@ -23,6 +24,9 @@ from .primvars import CornerValues, as_rows, read_normals, read_primvar
 from .report import Notebook
 from .stage import Frames, changes
 from .triangulate import triangulate
+
+if TYPE_CHECKING:
+    from .linking import LinkSubsets
 
 GLOW = "materialGlowTintsLight"
 
@@ -120,14 +124,19 @@ class MeshReader:
         self.document, self.materials = document, materials
         self.frames, self.code, self.report = frames, frames.first, report
         self._read: dict[tuple, MeshSource | None] = {}
+        self.link_subsets: LinkSubsets | None = None
+        """Subsets that light links divide meshes by, besides materials."""
 
     def read(self, prim: Usd.Prim) -> MeshSource | None:
         """The mesh of a Mesh or an intrinsic gprim; None (reported) if it has no faces."""
         subsets = _material_subsets(prim)
+        if self.link_subsets is not None:
+            subsets += self.link_subsets.of(prim, subsets)
         bound = [self.materials.bound(p) for p in (prim, *subsets)]
         color = self._inherited_color(prim)
         source = prim.GetPrimInPrototype() if prim.IsInstanceProxy() else prim
-        key = (source.GetPath(), tuple(look.path for look in bound), color)
+        names = tuple(subset.GetName() for subset in subsets)
+        key = (source.GetPath(), tuple(look.path for look in bound), color, names)
         if key not in self._read:
             self._read[key] = self._build(prim, subsets, bound)
         return self._read[key]

@@ -10,6 +10,7 @@ mod importance;
 mod incremental;
 mod instances;
 mod invariance;
+mod linking;
 mod measure;
 mod sampling;
 mod scenes;
