@@ -5,7 +5,7 @@
 //! ([`LitBy`]). A lane of a group leads to lights of some numbers, its *lane set*. For a receiver of a class, the
 //! importance of a lane is 0 if none of these numbers light the class, else what it is without linking. So it is 0
 //! only where no light below is linked, and picks, cuts, probabilities and moments agree, because all of them weigh
-//! groups by one [function](super::place).
+//! groups by one function (`place`).
 //!
 //! Lane sets follow from the links of the tree, so they cannot be wrong where the numbers are right. They are found
 //! once for an open file, and only if somebody asks for a frame [with links](LightTree::at_frame_linked). A set that

@@ -42,7 +42,7 @@ mod importance;
 mod known;
 pub mod learned;
 mod leaves;
-mod linking;
+pub mod linking;
 mod node;
 mod picks;
 mod place;
