@@ -3,15 +3,17 @@
 //! Lights that light the same have one *link number*; number 0 lights everything. The file has the number of each
 //! light and nothing more. Receivers come in *classes*: all receivers of a class are lit by the same numbers
 //! ([`LitBy`]). A lane of a group leads to lights of some numbers, its *lane set*. For a receiver of a class, the
-//! importance of a lane is 0 if none of these numbers light the class, else what it is without linking. So it is 0
-//! only where no light below is linked, and picks, cuts, probabilities and moments agree, because all of them weigh
-//! groups by one function (`place`).
+//! importance of a lane is 0 if none of these numbers light the class. Else it is multiplied by the share of the lane's
+//! energy that does: a strong lamp that lights one figure alone must not draw the samples of all that is around it. So it
+//! is 0 only where no light below is linked, and picks, cuts, probabilities and moments agree, because all of them
+//! weigh groups by one function (`place`).
 //!
-//! Lane sets follow from the links of the tree, so they cannot be wrong where the numbers are right. They are found
+//! Lane sets and shares follow from the tree, so they cannot be wrong where the numbers are right. They are found
 //! once for an open file, and only if somebody asks for a frame [with links](LightTree::at_frame_linked). A set that
 //! holds number 0 is that of number 0, for a lane with such a light is dark to nobody. All lights of a placed tree
 //! are of one number; below the leaf that stands for it, nothing is masked.
 
+use super::group::Group;
 use super::group::WIDTH;
 use super::importance::{Cluster, Factors, Sight};
 use super::node::Link;
@@ -23,7 +25,10 @@ use super::viewer::Viewer;
 use crate::math::Similarity;
 use std::collections::HashMap;
 use std::ops::Range;
-use std::sync::Arc;
+use std::sync::{Arc, PoisonError};
+
+/// More shares than this, of classes times groups, are not kept: 64 MB. Then a lane counts as a whole or not at all.
+const MOST_SHARES: usize = 1 << 21;
 
 /// A class of receivers, by number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -155,18 +160,101 @@ impl<D: AsRef<[u8]>> LightTree<D> {
         }
         let row = |row: u32| &self.trees()[row as usize];
         let is_whole = tree.root.is_some();
-        let still = tree.still.filter(|_| is_whole).map(|still| {
-            let sets = || Arc::new(self.find_lane_sets(row(still), None));
-            self.known().lane_sets.get_or_init(sets).clone()
+        let still = tree.still.filter(|_| is_whole);
+        let still = still.map(|still| self.still_lanes(row(still), lit_by));
+        let own = tree.root.filter(|root| Some(*root) != tree.still).map(|own| {
+            let sets = self.find_lane_sets(row(own), still.as_ref().map(|still| &*still.sets));
+            Arc::new(self.find_lit_lanes(row(own), Arc::new(sets), lit_by, still.as_deref()))
         });
-        let own = tree.root.filter(|root| Some(*root) != tree.still);
-        let own = own.map(|own| Arc::new(self.find_lane_sets(row(own), still.as_deref())));
         let forced = tree.forced.iter().map(|placed| self.link_of_emitter(placed.first_emitter));
         let parts = [still, own].into_iter().flatten();
-        let parts = parts.map(|sets| LitLanes { lit: sets.lit(lit_by), sets }).collect();
+        let parts = parts.collect();
         let links = FrameLinks { parts, forced: forced.collect(), lit_by: lit_by.clone() };
         tree.links = Some(Arc::new(links));
         Ok(tree)
+    }
+
+    /// What is known of the tree of what stands still. What one lot of receivers needs is kept until another asks.
+    fn still_lanes(&self, tree: &TreeRow, lit_by: &Arc<LitBy>) -> Arc<LitLanes> {
+        let known = &self.known().lit_lanes;
+        let mut known = known.lock().unwrap_or_else(PoisonError::into_inner);
+        let sets = match &*known {
+            Some((own, lanes)) if Arc::ptr_eq(own, lit_by) => return lanes.clone(),
+            Some((_, lanes)) => lanes.sets.clone(),
+            None => Arc::new(self.find_lane_sets(tree, None)),
+        };
+        let lanes = Arc::new(self.find_lit_lanes(tree, sets, lit_by, None));
+        *known = Some((lit_by.clone(), lanes.clone()));
+        lanes
+    }
+
+    /// What of the lanes of a tree lights each class. `still` is that of the tree that a leaf may stand for.
+    fn find_lit_lanes(
+        &self,
+        tree: &TreeRow,
+        sets: Arc<LaneSets>,
+        lit_by: &LitBy,
+        still: Option<&LitLanes>,
+    ) -> LitLanes {
+        let (groups, classes) = (self.groups_of(tree), lit_by.classes());
+        let lit = sets.lit(lit_by);
+        let (mut shares, mut whole) = (Vec::new(), vec![1.0; classes]);
+        if classes.saturating_mul(groups.len()) <= MOST_SHARES {
+            shares.reserve(classes * groups.len());
+            for (class, whole) in (0..).zip(&mut whole) {
+                let below = still.map_or(1.0, |still| still.whole[class as usize]);
+                let start = shares.len();
+                shares.resize(start + groups.len(), [1.0; WIDTH]);
+                let is_lit = |set| lit.get(class, set);
+                *whole = self.find_shares(groups, &sets, is_lit, below, &mut shares[start..]);
+            }
+        }
+        LitLanes { sets, lit, shares, whole }
+    }
+
+    /// Fills in the shares of the energies of lanes that light a class, and returns that of all. `below` is the share
+    /// of the tree of what stands still. A share is 1 only if it is the whole, and 0 only if it is nothing.
+    fn find_shares(
+        &self,
+        groups: &[Group],
+        sets: &LaneSets,
+        is_lit: impl Fn(u32) -> bool,
+        below: f32,
+        shares: &mut [[f32; WIDTH]],
+    ) -> f32 {
+        let mut of_groups = vec![1.0f32; groups.len()];
+        for at in (0..groups.len()).rev() {
+            let (mut lit, mut all, mut is_whole) = (0.0, 0.0, true);
+            for (lane, own) in shares[at].iter_mut().enumerate() {
+                let share = match groups[at].link(lane) {
+                    Link::Nothing => continue,
+                    Link::Inner(ahead) => {
+                        of_groups.get(at + ahead as usize).copied().unwrap_or(1.0)
+                    }
+                    Link::Instance(row) if self.places_still(row) => below,
+                    Link::Instance(_) | Link::Emitter(_) => 1.0,
+                };
+                *own = if is_lit(sets.of_lanes[at][lane]) { share } else { 0.0 };
+                let energy = f64::from(groups[at].energy(lane));
+                lit += energy * f64::from(*own);
+                all += energy;
+                is_whole &= *own == 1.0;
+            }
+            if !is_whole {
+                // Of a file that nobody verified, it may be no number.
+                let share = (lit / all) as f32;
+                let is_some = share > f32::MIN_POSITIVE;
+                of_groups[at] = if is_some { share.min(1.0) } else { f32::MIN_POSITIVE };
+            }
+        }
+        of_groups.first().copied().unwrap_or(1.0)
+    }
+
+    /// Whether an instance is of the tree of what stands still.
+    fn places_still(&self, row: u32) -> bool {
+        let instance = self.instances().get(row as usize);
+        let tree = instance.and_then(|instance| self.trees().get(instance.tree as usize));
+        tree.and_then(TreeKind::of) == Some(TreeKind::Still)
     }
 
     /// The lane sets of a tree whose walks end. `still` are those of the tree that a leaf may stand for.
@@ -270,26 +358,39 @@ impl LaneSets {
 #[derive(Debug)]
 pub(super) struct FrameLinks {
     /// The trees whose lanes lead to lights of several numbers: of what stands still, and of the frame.
-    parts: Vec<LitLanes>,
+    parts: Vec<Arc<LitLanes>>,
     /// Of each forced light its link number.
     forced: Vec<u32>,
     lit_by: Arc<LitBy>,
 }
 
+/// What of the lanes of a tree lights each class of receivers.
 #[derive(Debug)]
-struct LitLanes {
+pub(super) struct LitLanes {
     sets: Arc<LaneSets>,
-    /// By class and set.
+    /// By class and set, whether any of it does.
     lit: BitRows,
+    /// By class and group, of each lane the share of its energy that does; empty if these would be too many.
+    shares: Vec<[f32; WIDTH]>,
+    /// By class, that share of the whole tree.
+    whole: Vec<f32>,
 }
 
 impl FrameLinks {
-    /// Takes the weight of the lanes of a group that do not light a class.
+    /// Weighs the lanes of a group by what of them lights a class.
     #[inline]
-    pub fn mask(&self, class: ReceiverClass, group: u32, importances: &mut [f64; WIDTH]) {
+    pub fn weigh(&self, class: ReceiverClass, group: u32, importances: &mut [f64; WIDTH]) {
         let part = self.parts.iter().find(|part| part.sets.groups.contains(&group));
-        let Some(LitLanes { sets, lit }) = part else { return };
-        let of_lanes = &sets.of_lanes[(group - sets.groups.start) as usize];
+        let Some(LitLanes { sets, lit, shares, .. }) = part.map(|part| &**part) else { return };
+        let at = (group - sets.groups.start) as usize;
+        let row = (class.0 as usize).checked_mul(sets.of_lanes.len());
+        if let Some(shares) = row.and_then(|row| shares.get(row + at)) {
+            for (importance, &share) in importances.iter_mut().zip(shares) {
+                *importance *= f64::from(share);
+            }
+            return;
+        }
+        let of_lanes = &sets.of_lanes[at];
         for (importance, &set) in importances.iter_mut().zip(of_lanes) {
             if !lit.get(class.0, set) {
                 *importance = 0.0;

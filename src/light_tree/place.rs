@@ -71,7 +71,7 @@ impl FrameTree<'_> {
         if V::IS_LINKED
             && let Some(links) = &self.links
         {
-            links.mask(place.viewer.class(), place.at, &mut importances);
+            links.weigh(place.viewer.class(), place.at, &mut importances);
         }
         Some(Weighed { group, importances, spreads, veils })
     }
