@@ -15,6 +15,7 @@ from pathlib import Path
 import fog_spots
 import hidden
 import lamps
+import linked
 import million_points
 import spiral_mesh
 import spiral_points
@@ -32,6 +33,7 @@ SCENES = {
     "textured_lights": textured_lights.write,
     "two_rooms": hidden.write_rooms,
     "behind_house": hidden.write_house,
+    "linked": linked.write,
 }
 GLTF = {"million_points", "one_area", "textured_lights"}
 EXPORTER = Path(__file__).resolve().parents[2] / "scripts" / "usd_to_gltf.py"

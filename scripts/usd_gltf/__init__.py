@@ -14,6 +14,7 @@ A tour, in the order of the work:
 `light_visibility`, `light_losses`, `vendors`   which rays see a light; what is lost of it
 `light_shapes`      tessellation and world-space areas of the intrinsic lights
 `light_carriers`    which glTF object carries which light
+`linking`           which lights light what, and what casts their shadows
 `light_textures`    the pictures of rect lights and domes
 `pictures`, `baking`, `asset_files`     picture files into arrays, light of any range into a PNG
 `mesh`, `triangulate`, `primvars`, `gprims`     geometry

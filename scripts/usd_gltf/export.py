@@ -12,6 +12,7 @@ from . import EXPORTER
 from .gltf_document import Document, number
 from .light_carriers import LightCarriers
 from .light_textures import LightTextures
+from .linking import Linking, LinkSubsets
 from .materials import Materials
 from .mesh import MeshReader
 from .node_writer import NodeWriter, root_node
@@ -54,13 +55,16 @@ def export(source: Path, output: Path, options: Options) -> Exported:
     materials = Materials(document, surfaces.read, report.about("materials"))
     skinning = Skinning(stage, frames, report.about("geometry"))
     meshes = MeshReader(document, materials, skinning, frames, options.complexity, report.about("geometry"))
+    meshes.link_subsets = LinkSubsets(stage, report.about("lights"))
     tree = PrimTree(stage, meshes, frames, options.purposes, meters_per_unit, report.about("geometry"))
     pictures = LightTextures(document, dependencies, frames, report.about("lights"))
     carriers = LightCarriers(
         document, materials, pictures, frames, meters_per_unit, options.normalize_area, report.about("lights")
     )
-    writer = NodeWriter(document, materials, carriers, frames, report.about("animation"))
-    writer.write(tree.roots(), root_node(meters_per_unit, up_axis == UsdGeom.Tokens.z))
+    prims = tree.roots()
+    linking = Linking(stage, prims, report.about("lights"))
+    writer = NodeWriter(document, materials, carriers, linking, frames, report.about("animation"))
+    writer.write(prims, root_node(meters_per_unit, up_axis == UsdGeom.Tokens.z))
     other.count("nodes", len(document.nodes))
     dependencies.add_layers(stage)
     fingerprint = dependencies.fingerprint(options)

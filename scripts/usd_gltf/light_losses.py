@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pxr import Sdf, Usd
+from pxr import Sdf
 
 from .light_attributes import LightAttributes
 
@@ -60,12 +60,5 @@ def _relations(inputs: LightAttributes) -> None:
     # Files before USD 21.02 say `filters`.
     if targets("light:filters") or targets("filters"):
         report.warn(path, "light filters", "they have no carrier; the light is exported unfiltered")
-    for link in ("lightLink", "shadowLink"):
-        collection = f"collection:{link}"
-        root = prim.GetAttribute(f"{collection}:includeRoot").Get()
-        listed = targets(f"{collection}:includes") or targets(f"{collection}:excludes")
-        if Usd.CollectionAPI(prim, link) and (root is False or listed):
-            lost = "lights everything" if link == "lightLink" else "is shadowed by everything"
-            report.warn(path, link, f"linking has no carrier; the light {lost}")
     if str(prim.GetTypeName()).startswith("DomeLight") and targets("portals"):
         report.note(path, "dome portals", "they only guide sampling and have no carrier")

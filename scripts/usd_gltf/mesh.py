@@ -12,6 +12,7 @@ either: flat shading.
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from pxr import Usd, UsdGeom, UsdShade
@@ -26,6 +27,9 @@ from .skinning import Skinning
 from .stage import Frames, changes
 from .subdivision import Subdivider, Surface
 from .triangulate import triangulate
+
+if TYPE_CHECKING:
+    from .linking import LinkSubsets
 
 GLOW = "materialGlowTintsLight"
 
@@ -144,14 +148,20 @@ class MeshReader:
         self.frames, self.code, self.report = frames, frames.first, report
         self.subdivider = Subdivider(complexity, frames, report)
         self._read: dict[tuple, MeshSource | None] = {}
+        self.link_subsets: LinkSubsets | None = None
+        """Subsets that light links divide meshes by, besides materials."""
 
     def read(self, prim: Usd.Prim) -> MeshSource | None:
         """The mesh of a Mesh or an intrinsic gprim; None (reported) if it has no faces."""
         subsets = _material_subsets(prim)
+        if self.link_subsets is not None:
+            subsets += self.link_subsets.of(prim, subsets)
         bound = [self.materials.bound(p) for p in (prim, *subsets)]
         color = self._inherited_color(prim)
         source = prim.GetPrimInPrototype() if prim.IsInstanceProxy() else prim
-        key = (source.GetPath(), tuple(look.path for look in bound), color, self.skinning.name(prim))
+        names = tuple(subset.GetName() for subset in subsets)
+        looks = tuple(look.path for look in bound)
+        key = (source.GetPath(), looks, color, names, self.skinning.name(prim))
         if key not in self._read:
             self._read[key] = self._build(prim, subsets, bound)
         return self._read[key]

@@ -12,6 +12,7 @@ from .animation import animate, varies
 from .gltf_document import Document, numbers
 from .instancers import Placements
 from .light_carriers import LightCarriers
+from .linking import Linking, Place
 from .materials import Materials
 from .mesh import MeshSource
 from .prim_tree import Prim
@@ -30,10 +31,12 @@ class NodeWriter:
         document: Document,
         materials: Materials,
         carriers: LightCarriers,
+        linking: Linking,
         frames: Frames,
         report: Notebook,
     ) -> None:
         self.document, self.materials, self.carriers = document, materials, carriers
+        self.linking = linking
         self.frames, self.report = frames, report
         self._meshes: dict[int, int] = {}
         self._still: dict[int, tuple[dict, dict | None]] = {}
@@ -44,14 +47,15 @@ class NodeWriter:
         while root["name"] in {prim.name for prim in prims}:
             root["name"] += "_"
         index = self.document.node(root)
-        children = [self._prim(prim, prim.path, np.eye(4)) for prim in prims]
+        children = [self._prim(prim, prim.path, np.eye(4), ()) for prim in prims]
         children = [child for child in children if child >= 0] + self._top
         if children:
             root["children"] = children
         self.document.roots = [index]
 
-    def _prim(self, prim: Prim, path: str, above: np.ndarray) -> int:
-        """The node of a prim that stands under the world matrices `above`."""
+    def _prim(self, prim: Prim, path: str, above: np.ndarray, chain: Place) -> int:
+        """The node of a prim that stands under the world matrices `above`, placed by a chain of
+        PointInstancers."""
         world = (prim.local if prim.resets else above @ prim.local) if prim.lit else above
         if prim.local.ndim == 3:
             node, outer = self._moving(path, prim.name, prim.local)
@@ -59,14 +63,14 @@ class NodeWriter:
             if id(prim) not in self._still:
                 self._still[id(prim)] = _still(prim.local)
             node, outer = self._placed(path, prim.name, *self._still[id(prim)])
-        self._fill(node, prim, path, world)
+        self._fill(node, prim, path, world, chain)
         if not prim.resets:
             return outer
         # The child of no one: it stands by its own matrix alone.
         self._top.append(outer)
         return -1
 
-    def _fill(self, node: dict, prim: Prim, path: str, world: np.ndarray) -> None:
+    def _fill(self, node: dict, prim: Prim, path: str, world: np.ndarray, chain: Place) -> None:
         """Content and children of a node."""
         if prim.camera is not None:
             camera, extras = prim.camera
@@ -74,19 +78,22 @@ class NodeWriter:
             node["extras"]["usdCamera"] = extras
         if prim.fog is not None:
             node["extras"]["usdFog"] = prim.fog
+        node["extras"].update(self.linking.node(prim, chain))
+        mesh = self.linking.mesh(prim, chain)
         if prim.light is not None:
-            self.carriers.carry(prim.light, node, world, prim.mesh)
-        elif prim.mesh is not None:
-            node["mesh"] = self._mesh(prim.mesh)
+            self.carriers.carry(prim.light, node, world, mesh)
+            node["extras"]["usdLux"].update(self.linking.light(prim))
+        elif mesh is not None:
+            node["mesh"] = self._mesh(mesh)
             keys = prim.mesh.glow_keys()
             if keys is not None:
                 values = {"times": numbers(self.frames.seconds), "rgb": [numbers(row) for row in keys]}
                 node["extras"]["usdLux"] = {"type": "MeshLight", "inputs": {}, "values": values}
             else:
                 prim.mesh.report_still_glow(self.report.about("lights"))
-        children = [self._prim(child, path + child.path[len(prim.path) :], world) for child in prim.children]
+        children = [self._prim(child, path + child.path[len(prim.path) :], world, chain) for child in prim.children]
         for prototype, placements in prim.instances:
-            children += self._instances(prototype, placements, path, world)
+            children += self._instances(prototype, placements, path, world, (prim.path, *chain))
         children = [child for child in children if child >= 0]
         if children:
             node["children"] = children
@@ -97,7 +104,9 @@ class NodeWriter:
             self._meshes[id(mesh)] = self.document.shared("meshes", body)
         return self._meshes[id(mesh)]
 
-    def _instances(self, prototype: Prim, placements: Placements, path: str, world: np.ndarray) -> list[int]:
+    def _instances(
+        self, prototype: Prim, placements: Placements, path: str, world: np.ndarray, chain: Place
+    ) -> list[int]:
         """Nodes of all instances of one prototype; the prototype's root is the instance's node."""
         local = prototype.local if prototype.local.ndim == 2 else prototype.local[:, None]
         matrices = placements.matrices @ local
@@ -114,7 +123,7 @@ class NodeWriter:
             else:
                 place = _place(*(part[position] for part in static[:3]))
                 node, outer = self._placed(name, prototype.name, place, None)
-            self._fill(node, prototype, name, world @ matrix if prototype.lit else world)
+            self._fill(node, prototype, name, world @ matrix if prototype.lit else world, chain)
             nodes.append(outer)
         return nodes
 

@@ -37,6 +37,8 @@ class Prim:
     resets: bool = False
     mesh: MeshSource | None = None
     light: Light | None = None
+    light_path: str = ""
+    """The path of the light's own prim, whose collections link it."""
     camera: tuple[dict, dict] | None = None
     fog: dict | None = None
     instances: list[tuple[Prim, Placements]] = field(default_factory=list)
@@ -163,6 +165,7 @@ class PrimTree:
             light_prim = geometry_light or prim
             if compiled.mesh is not None and light_type(light_prim) is not None:
                 compiled.light = self._light(light_prim, "MeshLight")
+                compiled.light_path = str(light_prim.GetPath())
                 self._lit_geometry.add(str(path))
         elif prim.IsA(UsdGeom.Camera):
             compiled.camera = read_camera(prim, self.frames, self.meters_per_unit, self.report.about("cameras"))
@@ -171,6 +174,7 @@ class PrimTree:
                 self.lights.warn(path, "GeometryLight emits nothing", "its geometry relationship is empty")
         elif light_type(prim) is not None:
             compiled.light = self._light(prim, light_type(prim))
+            compiled.light_path = str(path)
         elif prim.IsA(UsdLux.LightFilter):
             self.lights.warn(path, kind, "light filters have no carrier")
         elif compiled.fog is None and (prim.IsA(UsdGeom.Gprim) or kind == "Volume"):

@@ -16,11 +16,12 @@ const LEAST_MOVE: f32 = 4.0 * f32::EPSILON;
 /// A smaller relative difference of energy is rounding if the energies were summed in different trees.
 const LEAST_ENERGY: f32 = 1e-4;
 
-/// All that differs between two versions of a light that are known to differ. Empty if only their
+/// All that differs between two versions of a light that are known to differ; `links` is what differs in those. Empty if only their
 /// representation differs: a mesh that gains another instance gets a tree of its own.
 pub(super) fn differences(
     before: &Described,
     after: &Described,
+    links: &[Difference],
     apart: Option<Apart>,
 ) -> Vec<Difference> {
     let (a, b) = (&before.card, &after.card);
@@ -57,6 +58,7 @@ pub(super) fn differences(
     if a.forced != b.forced {
         found.push(Difference::Forced { before: a.forced, after: b.forced });
     }
+    found.extend_from_slice(links);
     let goes_on = apart.is_some_and(|apart| exceeds(&apart, &found));
     if (both_lit && a.changes != b.changes) || (a.changes && found.is_empty()) || goes_on {
         found.push(Difference::OverTime { before: a.changes, after: b.changes, apart });

@@ -91,6 +91,16 @@ pub enum Difference {
         /// After.
         after: bool,
     },
+    /// Which prims it lights.
+    LightLink {
+        /// Those of two scenes; `None` where a tree file tells only that it lights others.
+        prims: Option<Relinked>,
+    },
+    /// Which prims cast shadows from it.
+    ShadowLink {
+        /// Those of two scenes.
+        prims: Option<Relinked>,
+    },
     /// How far it reaches.
     Range {
         /// Metres before; `None` is physical.
@@ -110,6 +120,19 @@ pub enum Difference {
     /// How its emission is distributed: its texture, its profile within the cone, the shares of its
     /// emitters. It stands for all that the other differences do not tell.
     Pattern,
+}
+
+/// Prims of both scenes that are in a link set of one and not of the other.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct Relinked {
+    /// How many are in it now and were not.
+    pub gained: usize,
+    /// The paths of the first few of them.
+    pub gained_named: Vec<String>,
+    /// How many were in it and are not now.
+    pub lost: usize,
+    /// The paths of the first few of them.
+    pub lost_named: Vec<String>,
 }
 
 /// How far apart two versions of a light come in the course of time.
@@ -142,6 +165,8 @@ impl Difference {
             Difference::Cone { .. } => "cone",
             Difference::Kind { .. } => "kind",
             Difference::Forced { .. } => "forced",
+            Difference::LightLink { .. } => "light_link",
+            Difference::ShadowLink { .. } => "shadow_link",
             Difference::Range { .. } => "range",
             Difference::OverTime { .. } => "over_time",
             Difference::Pattern => "pattern",

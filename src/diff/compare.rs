@@ -222,7 +222,7 @@ impl<'a> Weigher<'a> {
         let after = pair.after.as_ref().map(|half| describer.describe(1, half));
         let differences = match (&before, &after) {
             (Some(before), Some(after)) if !pair.is_renamed_only() => {
-                differences(before, after, self.apart.get(&pair.number).copied())
+                differences(before, after, &pair.links, self.apart.get(&pair.number).copied())
             }
             _ => Vec::new(),
         };

@@ -107,6 +107,7 @@ impl Infinite {
             color: self.color,
             energy: self.illuminance_lux,
             emitters: 0,
+            link: 0,
             profile: self.profile,
         }
     }

@@ -19,6 +19,8 @@ pub(super) struct Light<'a> {
     /// In the unit of [`LightCard::energy`].
     pub energy: f32,
     pub emitters: u32,
+    /// Its link number in its own version; 0 at infinity.
+    pub link: u32,
     /// What only a scene tells; the default for a light of a tree.
     pub profile: Profile,
 }

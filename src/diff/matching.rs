@@ -206,6 +206,7 @@ mod tests {
             color: [65535; 3],
             energy: 2.0,
             emitters: 1,
+            link: 0,
             profile: Profile::default(),
         }
     }

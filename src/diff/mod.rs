@@ -18,6 +18,7 @@
 //! | `matching`, `pairs` | which light corresponds to which, with renames |
 //! | `card`, `describe` | one light, described |
 //! | `change`, `amounts` | one light that differs, and each [`Difference`] with its amount |
+//! | `links` | which prims lights light, and what casts their shadows |
 //! | `over_time` | lights that change, followed through the frames |
 //! | `totals` | how many lights and how much of them, before and after |
 //! | `picking`, `probes` | how far the probabilities of picks moved, and where that is measured |
@@ -37,6 +38,7 @@ mod html;
 mod infinite;
 pub mod json;
 mod light;
+mod links;
 mod matching;
 mod over_time;
 mod pairs;
@@ -51,7 +53,7 @@ mod totals;
 mod tree_side;
 
 pub use card::{Kind, LightCard, Place};
-pub use change::{Apart, Change, Difference, Verb};
+pub use change::{Apart, Change, Difference, Relinked, Verb};
 pub use compare::{DiffOptions, compare};
 pub use folder::{FolderDiff, Outcome, Shot, compare_folders};
 pub use heat::{HeatCell, HeatMap};

@@ -1,7 +1,8 @@
 //! The lights of both versions, side by side: what is to be compared with what.
 
-use super::change::Verb;
+use super::change::{Difference, Verb};
 use super::light::Light;
+use super::links::LinkChanges;
 use super::matching::matching;
 use super::scene_side::{Dark, SceneSide};
 use std::collections::HashMap;
@@ -20,13 +21,17 @@ pub(super) struct Pair<'a> {
     pub after: Option<Half<'a>>,
     /// The light's number, the same in both versions.
     pub number: u32,
+    /// What differs in its links.
+    pub links: Vec<Difference>,
 }
 
 impl Pair<'_> {
     /// Whether it has another path and nothing else differs.
     pub fn is_renamed_only(&self) -> bool {
         match (&self.before, &self.after) {
-            (Some(Half::Lit(before)), Some(Half::Lit(after))) => before.has_content_of(after),
+            (Some(Half::Lit(before)), Some(Half::Lit(after))) => {
+                before.has_content_of(after) && self.links.is_empty()
+            }
             _ => false,
         }
     }
@@ -52,6 +57,7 @@ impl<'a> Pairs<'a> {
         [before, after]: [&[Light<'a>]; 2],
     ) -> Pairs<'a> {
         let found = matching(before, after);
+        let changes = LinkChanges::new(scenes);
         let count = before.len() + found.added.len();
         let mut pairs = Pairs {
             changed: Vec::new(),
@@ -67,11 +73,12 @@ impl<'a> Pairs<'a> {
         for (&(b, a), verb) in same.chain(renamed) {
             pairs.number_of_after[a as usize] = b;
             let (then, now) = (before[b as usize], after[a as usize]);
-            if verb == Verb::Dirtied && then.has_content_of(&now) {
+            let links = changes.of(&then, &now);
+            if verb == Verb::Dirtied && then.has_content_of(&now) && links.is_empty() {
                 pairs.unchanged.push(a);
             } else {
                 let (then, now) = (Some(Half::Lit(then)), Some(Half::Lit(now)));
-                pairs.changed.push(Pair { verb, before: then, after: now, number: b });
+                pairs.changed.push(Pair { verb, before: then, after: now, number: b, links });
             }
         }
         // A light that one scene lacks may be there as a dark prim: then it was switched on or off.
@@ -84,14 +91,16 @@ impl<'a> Pairs<'a> {
             let light = before[row as usize];
             let after = dark_after.get(light.path).map(|&dark| Half::Dark(light.path, dark));
             let verb = if after.is_some() { Verb::Dirtied } else { Verb::Removed };
-            pairs.changed.push(Pair { verb, before: Some(Half::Lit(light)), after, number: row });
+            let (before, links) = (Some(Half::Lit(light)), Vec::new());
+            pairs.changed.push(Pair { verb, before, after, number: row, links });
         }
         for &row in &found.added {
             let light = after[row as usize];
             let before = dark_before.get(light.path).map(|&dark| Half::Dark(light.path, dark));
             let verb = if before.is_some() { Verb::Dirtied } else { Verb::Added };
             let number = pairs.number_of_after[row as usize];
-            pairs.changed.push(Pair { verb, before, after: Some(Half::Lit(light)), number });
+            let (after, links) = (Some(Half::Lit(light)), Vec::new());
+            pairs.changed.push(Pair { verb, before, after, number, links });
         }
         pairs
     }

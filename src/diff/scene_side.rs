@@ -98,6 +98,7 @@ impl<'a> SceneSide<'a> {
             color: summary.look.color,
             energy: without_crumbs(summary.energy),
             emitters: summary.emitter_count,
+            link: summary.link,
             profile: self.profiles.of_light(self.scene, entry.source),
         });
         let infinite =

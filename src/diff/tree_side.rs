@@ -14,7 +14,7 @@ use std::collections::HashMap;
 use std::f32::consts::PI;
 
 /// The sections that list lights.
-const ROWS: [&[u8; 4]; 2] = [b"LGHT", b"PATH"];
+const ROWS: [&[u8; 4]; 3] = [b"LGHT", b"PATH", b"LINK"];
 /// The sections that must be equal if the fingerprints are: the content determines them.
 const TREES: [&[u8; 4]; 5] = [b"TREE", b"GRUP", b"INST", b"FRAM", b"FORC"];
 
@@ -79,6 +79,7 @@ fn of_row<'a, D: AsRef<[u8]>>(tree: &'a LightTree<D>, row: u32, light: &'a Light
         color: light.look.color,
         energy: without_crumbs(light.energy),
         emitters: light.emitter_count,
+        link: tree.link_of(row as usize),
         profile: Profile::default(),
     }
 }

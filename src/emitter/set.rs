@@ -4,7 +4,8 @@ use super::mesh_light::{self, MeshLight, MeshLights};
 use super::textured::{KnownMeans, TextureMeans};
 use crate::math::Similarity;
 use crate::math::color::{Rgb, luminance};
-use crate::scene::{Keys, LightKind, Scene};
+use crate::scene::{Keys, LightKind, Links, Scene};
+use std::collections::HashMap;
 
 /// What the tree picks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -59,6 +60,11 @@ pub struct LightEntry {
     /// Whether a tree in the space of its own mesh serves it, shared with other instances or carried
     /// along: its node's transform keeps shapes at every time.
     pub in_own_space: bool,
+    /// What it is linked by.
+    pub links: Links,
+    /// Its link number: 0 if it lights everything, else the same as that of all lights that light the same, in
+    /// the order of the first of them.
+    pub link: u32,
     /// Number of its first emitter.
     pub first: u32,
     /// How many emitters it has.
@@ -99,6 +105,8 @@ pub struct Emitters {
     firsts: Vec<u32>,
     /// For every [`BLOCK`] emitters the light of the first.
     blocks: Vec<u32>,
+    /// The link set that each link number stands for; without that of number 0.
+    link_sets: Vec<u32>,
     /// For each instance of the scene its light, if it is one.
     light_of_instance: Vec<Option<u32>>,
     /// For each light of the scene its entry, if it has one.
@@ -126,6 +134,8 @@ impl Emitters {
                     varies: light.values.as_ref().is_some_and(Keys::varies),
                     forced: light.forced,
                     in_own_space: false,
+                    links: scene.linking.of_light(i as u32),
+                    link: 0,
                     first: 0,
                     count: 1,
                 });
@@ -140,6 +150,7 @@ impl Emitters {
         let mut light_of_instance = vec![None; scene.instances.len()];
         let mut entry_of_light = vec![None; scene.lights.len()];
         let (mut count, mut blocks) = (0u32, Vec::new());
+        let link_sets = number_links(&mut lights);
         for (row, entry) in (0..).zip(&mut lights) {
             entry.first = count;
             // `ingest` refuses scenes of more.
@@ -163,6 +174,7 @@ impl Emitters {
             count,
             firsts,
             blocks,
+            link_sets,
             light_of_instance,
             entry_of_light,
         }
@@ -181,6 +193,12 @@ impl Emitters {
     /// What textures give the triangles of the mesh lights, by ascending fingerprint, each once.
     pub fn texture_means(&self) -> &[TextureMeans] {
         &self.texture_means
+    }
+
+    /// The link sets of the scene that the lights' link numbers stand for, from number 1 on. Empty if every light
+    /// lights everything.
+    pub fn link_sets(&self) -> &[u32] {
+        &self.link_sets
     }
 
     /// How many emitters there are.
@@ -259,6 +277,20 @@ impl Emitters {
     }
 }
 
+/// Numbers the link sets of sorted lights, and returns those that have numbers.
+fn number_links(lights: &mut [LightEntry]) -> Vec<u32> {
+    let (mut sets, mut numbers) = (Vec::new(), HashMap::new());
+    for light in lights {
+        if let Some(set) = light.links.light {
+            light.link = *numbers.entry(set).or_insert_with(|| {
+                sets.push(set);
+                sets.len() as u32
+            });
+        }
+    }
+    sets
+}
+
 /// The instances that are lights.
 fn mesh_entries(
     scene: &Scene,
@@ -285,6 +317,8 @@ fn mesh_entries(
             varies,
             forced: instance.forced,
             in_own_space: is_shared && count >= LEAST_TO_SHARE && keeps_shapes(instance.node),
+            links: scene.linking.of_instance(i as u32),
+            link: 0,
             first: 0,
             count,
         })

@@ -117,6 +117,11 @@ fn lights(needs: &Requirements, emitters: &Emitters) -> Vec<Feature> {
         Feature::new("forced lights", needs.forced)
             .with("sampled at every point beside what is picked"),
         Feature::new("lights hidden from some rays", needs.hidden),
+        Feature::new("light links", needs.light_links)
+            .with("numbers of lights, in the tree file; surfaces that not all lights light pick by them")
+            .taking(if emitters.link_sets().is_empty() { 0 } else { 4 * emitters.lights().len() }),
+        Feature::new("shadow links", needs.shadow_links)
+            .with("rays to these lights ask each prim; reflected rays find none of their light"),
         Feature::new("textured mesh lights", needs.textured_mesh_lights)
             .used_by(
                 means.len(),

@@ -32,6 +32,10 @@ pub struct TreeReport {
     pub changing: usize,
     /// How many are forced: in no estimate, and sampled at every point.
     pub forced: usize,
+    /// How many do not light everything.
+    pub linked: usize,
+    /// How many different sets those light.
+    pub link_sets: usize,
     /// Energy of all lights: peak radiant intensity, candela (of those that change in the first frame).
     pub energy: f64,
     /// Trees put somewhere.
@@ -121,6 +125,8 @@ impl TreeReport {
             emitters,
             changing: count(LightRow::CHANGES),
             forced: count(LightRow::FORCED),
+            linked: (0..lights.len()).filter(|&row| tree.link_of(row) != 0).count(),
+            link_sets: tree.link_numbers() as usize - 1,
             energy,
             instances: tree.instances().len(),
             frames: span(tree.frames()),

@@ -188,7 +188,7 @@ mod tests {
         let lights = [("/lamp", 1, 5.0, 0), ("/string", 12, 36.0, LightRow::PLACED)];
         let lights = lights.map(|(path, emitter_count, energy, class)| {
             let (path, fingerprint, look) = (path.into(), [0; 32], LightLook::default());
-            LightSummary { path, fingerprint, emitter_count, energy, class, look }
+            LightSummary { path, fingerprint, emitter_count, energy, class, look, link: 0 }
         });
         let tree = LightTree::open(writer.finish(&LightList::new(&lights), "{}", [0; 32])).unwrap();
         tree.verify().unwrap();

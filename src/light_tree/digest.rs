@@ -25,6 +25,7 @@ impl<D: AsRef<[u8]> + Sync> LightTree<D> {
         let (root, forced) = self.roots_at(frame)?;
         let mut hasher = Hasher::new();
         hasher.update(bytemuck::bytes_of(&self.numbering()));
+        self.hash_links(&mut hasher);
         hasher.update(&root.map_or([0; 32], |row| self.digest_of(row)));
         for &instance in forced {
             if let Some(instance) = self.instances().get(instance as usize) {
@@ -85,6 +86,19 @@ impl<D: AsRef<[u8]> + Sync> LightTree<D> {
         hasher.update(bytemuck::cast_slice(&nameless));
         placed.into_iter().for_each(|instance| self.hash_placed(instance, &mut hasher));
         *hasher.finalize().as_bytes()
+    }
+
+    /// Where link numbers change, if there are any: a file that was built for one frame may have one row for
+    /// several lights.
+    fn hash_links(&self, hasher: &mut Hasher) {
+        let mut before = 0;
+        for (row, light) in self.lights().iter().enumerate().take(self.light_links().len()) {
+            let number = self.link_of(row);
+            if number != before {
+                hasher.update(bytemuck::bytes_of(&[light.first_emitter, number]));
+                before = number;
+            }
+        }
     }
 
     fn hash_placed(&self, instance: &InstanceRow, hasher: &mut Hasher) {

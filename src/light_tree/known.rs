@@ -1,7 +1,8 @@
 //! What has been found out about the trees of an open file, so that it is found out once.
 
 use super::leaves::LeafTable;
-use std::sync::OnceLock;
+use super::linking::{LitBy, LitLanes};
+use std::sync::{Arc, Mutex, OnceLock};
 
 /// What is known of a file.
 #[derive(Default)]
@@ -12,6 +13,8 @@ pub(super) struct Known {
     pub rows: OnceLock<()>,
     /// Where the leaves are that frames share.
     pub leaves: OnceLock<LeafTable>,
+    /// What of the tree of what stands still lights receivers, for those that asked last.
+    pub lit_lanes: Mutex<Option<(Arc<LitBy>, Arc<LitLanes>)>>,
     /// What a table of what is seen belongs to.
     pub still_key: OnceLock<[u8; 32]>,
     trees: OnceLock<Box<[OfTree]>>,

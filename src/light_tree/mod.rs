@@ -29,6 +29,7 @@
 //! | `front` | the groups that matter most to some viewers |
 //! | `learned` | where receivers are, and what they see |
 //! | `veil` | what is known of how much of each cluster is hidden |
+//! | `linking` | which lights light which receivers |
 
 mod base;
 mod builder;
@@ -41,6 +42,7 @@ mod importance;
 mod known;
 pub mod learned;
 mod leaves;
+pub mod linking;
 mod node;
 mod picks;
 mod place;
@@ -63,6 +65,7 @@ pub use cut::{Picked, Scratch};
 pub use front::{Front, FrontGroup};
 pub use glossy::{Glossy, Lobes};
 pub use group::{Group, WIDTH};
+pub use linking::{Linked, LitBy, ReceiverClass, SameLinks};
 pub use node::{Link, Node};
 pub use records::{
     FrameRow, InstanceRow, LightLook, LightRow, MeanRow, Numbering, TextureRow, TreeKind, TreeRow,

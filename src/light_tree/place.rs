@@ -41,7 +41,8 @@ pub(super) enum Next<V> {
 /// The children of a cluster as one viewer sees them.
 pub(super) struct Weighed<'a> {
     pub group: &'a Group,
-    /// In world space's unit; 0 only where provably no light arrives.
+    /// In world space's unit; 0 only where provably no light arrives, or only from lights that do not light the
+    /// viewer's class.
     pub importances: [f64; WIDTH],
     /// How uncertain each is: the squared relative deviation of what its emitters send.
     pub spreads: [f32; WIDTH],
@@ -67,6 +68,11 @@ impl FrameTree<'_> {
             }
             weights
         });
+        if V::IS_LINKED
+            && let Some(links) = &self.links
+        {
+            links.weigh(place.viewer.class(), place.at, &mut importances);
+        }
         Some(Weighed { group, importances, spreads, veils })
     }
 
@@ -82,7 +88,13 @@ impl FrameTree<'_> {
 
     /// The root of a forced light. No importance there is ever compared with one elsewhere, so its
     /// unit stays its own.
+    /// `None` if the light does not light the viewer's class.
     pub(super) fn place_of_forced<V: Viewer>(&self, light: usize, viewer: &V) -> Option<Place<V>> {
+        if V::IS_LINKED
+            && let Some(links) = &self.links
+        {
+            links.lights_from_forced(viewer.class(), light).then_some(())?;
+        }
         let instance = self.instances.get(self.forced.get(light)?.instance as usize)?;
         let tree = self.trees.get(instance.tree as usize)?;
         Some(Place {

@@ -17,8 +17,21 @@ pub const LIGHTS: SectionId = SectionId(*b"LGHT");
 pub const PATHS: SectionId = SectionId(*b"PATH");
 pub const TEXTURES: SectionId = SectionId(*b"TXTR");
 pub const MEANS: SectionId = SectionId(*b"MEAN");
-pub const ALL: [SectionId; 11] =
-    [META, TREES, GROUPS, INSTANCES, FRAMES, FINGERPRINTS, FORCED, LIGHTS, PATHS, TEXTURES, MEANS];
+pub const LINKS: SectionId = SectionId(*b"LINK");
+pub const ALL: [SectionId; 12] = [
+    META,
+    TREES,
+    GROUPS,
+    INSTANCES,
+    FRAMES,
+    FINGERPRINTS,
+    FORCED,
+    LIGHTS,
+    PATHS,
+    TEXTURES,
+    MEANS,
+    LINKS,
+];
 
 /// One tree of a file.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]

@@ -8,6 +8,7 @@
 use super::cut::Picked;
 use super::group::Group;
 use super::leaves::{LeafTable, Leaves, Placed};
+use super::linking::FrameLinks;
 use super::node::{Link, Node};
 use super::place::{Next, Place, Weighed};
 use super::records::{InstanceRow, LightRow, TreeRow};
@@ -15,6 +16,7 @@ use super::tree::{LightTree, NoSuchFrame};
 use super::veil::{Cell, Veils};
 use super::viewer::Viewer;
 use crate::math::built_in;
+use std::sync::Arc;
 
 /// One light, picked.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -50,6 +52,8 @@ pub struct FrameTree<'a> {
     pub(super) emitter_count: u32,
     /// What is known to be hidden.
     pub(super) veils: Option<Veils<'a>>,
+    /// Which lights light which receivers.
+    pub(super) links: Option<Arc<FrameLinks>>,
     /// The first emitter of a forced light, if there is one.
     unforced_count: u32,
 }
@@ -81,6 +85,7 @@ impl<D: AsRef<[u8]>> LightTree<D> {
             forced: forced.collect(),
             emitter_count: self.emitter_count() as u32,
             veils: None,
+            links: None,
             unforced_count: self.first_of_class(LightRow::FORCED),
         })
     }
@@ -106,7 +111,7 @@ impl FrameTree<'_> {
         self.descend(self.place_of_root(viewer)?, u)
     }
 
-    /// Picks an emitter of a forced light, by its number among the forced lights.
+    /// Picks an emitter of a forced light, by its number among the forced lights; `None` if nothing can arrive.
     pub fn sample_forced(&self, light: usize, viewer: &impl Viewer, u: f64) -> Option<Pick> {
         self.descend(self.place_of_forced(light, viewer)?, u)
     }

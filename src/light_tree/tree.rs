@@ -30,6 +30,7 @@ pub struct LightTree<D> {
     paths: Range<usize>,
     textures: Option<Range<usize>>,
     means: Option<Range<usize>>,
+    links: Option<Range<usize>>,
     known: Arc<Known>,
 }
 
@@ -58,6 +59,7 @@ impl<D: AsRef<[u8]>> LightTree<D> {
             paths: required::<u8>(&container, records::PATHS)?,
             textures: container.find::<TextureRow>(records::TEXTURES)?,
             means: container.find::<MeanRow>(records::MEANS)?,
+            links: container.find::<u32>(records::LINKS)?,
             known: Arc::default(),
             container,
         })
@@ -77,6 +79,7 @@ impl<D: AsRef<[u8]>> LightTree<D> {
             paths: self.paths.clone(),
             textures: self.textures.clone(),
             means: self.means.clone(),
+            links: self.links.clone(),
             known: self.known.clone(),
         }
     }
@@ -175,6 +178,16 @@ impl<D: AsRef<[u8]>> LightTree<D> {
         let at = rows.binary_search_by_key(fingerprint, |row| row.fingerprint).ok()?;
         let TextureRow { first, count, .. } = rows[at];
         self.means().get(first as usize..)?.get(..count as usize)
+    }
+
+    /// The [link number](super::linking) of each light; empty if all light everything.
+    pub fn light_links(&self) -> &[u32] {
+        self.links.as_ref().map_or(&[], |range| self.container.view(range))
+    }
+
+    /// Whether there is such a section.
+    pub(super) fn has_links(&self) -> bool {
+        self.links.is_some()
     }
 
     /// How many emitters the lights have.

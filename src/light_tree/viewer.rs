@@ -5,6 +5,7 @@
 //! an instance, it takes the viewer along into that tree's space.
 
 use super::importance::{Cluster, Factors, Sight, factors};
+use super::linking::ReceiverClass;
 use super::veil::Cell;
 use crate::math::Similarity;
 use glam::Vec3;
@@ -40,6 +41,15 @@ pub trait Viewer: Copy {
     #[inline(always)]
     fn cell(&self) -> Cell {
         Cell::NONE
+    }
+
+    /// Whether only some lights may light it. If not, nothing is spent on links.
+    const IS_LINKED: bool = false;
+
+    /// The class that tells which [lights](super::linking) light it.
+    #[inline(always)]
+    fn class(&self) -> ReceiverClass {
+        ReceiverClass::ALL
     }
 }
 

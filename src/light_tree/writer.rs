@@ -11,7 +11,7 @@ use super::records::{
 use super::tree::LightTree;
 use crate::bounds::LightBounds;
 use crate::math::Similarity;
-use crate::store::{AlignedBytes, ContainerWriter};
+use crate::store::{AlignedBytes, ContainerWriter, TREE_FILE_WITHOUT_LINKS};
 use rayon::prelude::*;
 
 /// What a tree file says of one light.
@@ -29,6 +29,8 @@ pub struct LightSummary {
     pub class: u32,
     /// What it looks like.
     pub look: LightLook,
+    /// Its [link number](LightTree::light_links): 0 if it lights everything.
+    pub link: u32,
 }
 
 /// The lights of a file, in their order, and where each begins.
@@ -36,6 +38,8 @@ pub struct LightList<'a> {
     pub(super) lights: &'a [LightSummary],
     /// For each light its first emitter, and where its path begins among all paths, bytes.
     pub(super) starts: Vec<(u32, u32)>,
+    /// The link number of each; empty if all are 0.
+    links: Vec<u32>,
     /// Length of all paths together, bytes.
     path_length: usize,
 }
@@ -53,7 +57,10 @@ impl<'a> LightList<'a> {
             next_emitter += emitters;
             path_length += length as usize;
         }
-        LightList { lights, starts, path_length }
+        let is_linked = lights.par_iter().any(|light| light.link != 0);
+        let links =
+            if is_linked { lights.iter().map(|light| light.link).collect() } else { Vec::new() };
+        LightList { lights, starts, links, path_length }
     }
 
     /// A row of the section of lights.
@@ -264,6 +271,11 @@ impl<'a> LightTreeWriter<'a> {
             file.section(records::TEXTURES, false, &self.textures);
             file.section(records::MEANS, false, &self.means);
         }
-        file.finish(fingerprint)
+        // Nor these, for whoever has all lights light everything.
+        if !lights.links.is_empty() {
+            file.section(records::LINKS, false, &lights.links);
+            return file.finish(fingerprint);
+        }
+        file.finish_as(&TREE_FILE_WITHOUT_LINKS, fingerprint)
     }
 }

@@ -108,6 +108,9 @@ fn contribution(
     visibility: bool,
     points_along: u32,
 ) -> Contribution {
+    if integrator.links.is_some_and(|links| !links.lights(vertex.class, light)) {
+        return Contribution::default();
+    }
     let point = vertex.receiver.point;
     let at = |u: Vec2| {
         let found = integrator.incoming(light, point, vertex.receiver.normal, u)?;
@@ -118,7 +121,10 @@ fn contribution(
         let pdf = found.pdf.unwrap_or(1.0);
         let value = Contribution {
             luminance: luminance(reflected * found.radiance) / pdf,
-            by_reflection: if found.pdf.is_some() { bsdf_pdf / pdf } else { 0.0 },
+            by_reflection: match found.pdf {
+                Some(_) if found.shadow_set.is_none() => bsdf_pdf / pdf,
+                _ => 0.0,
+            },
         };
         Some((value, found))
     };

@@ -121,6 +121,7 @@ fn report(integrator: &Integrator, options: &ProbeOptions) -> ProbeReport {
                 tree = tree.veiled(veils);
             }
             let picker = LightPicker::new(&settings, tree, integrator.infinite);
+            let picker = picker.linked(integrator.links);
             StrategyReport {
                 name: format!("{way}{told}"),
                 ..of_way(way, &picker, &settings, grey, probes)

@@ -119,6 +119,8 @@ impl<'a, D: AsRef<[u8]> + Sync> Agreement<'a, D> {
                 "its energy"
             } else if row.look != now.look {
                 "its kind or colour"
+            } else if self.tree.link_of(at) != lights[at].link {
+                "its link"
             } else {
                 return None;
             };
@@ -152,6 +154,27 @@ impl<'a, D: AsRef<[u8]> + Sync> Agreement<'a, D> {
     pub fn of_numbering(&self, emitters: &Emitters) -> Option<Contradiction> {
         let what = "how the emitters are numbered";
         (self.tree.numbering() != numbering_of(emitters)).then(|| self.in_general(what))
+    }
+
+    /// The link numbers of lights, and where the lights begin; nothing, if every light lights everything.
+    pub fn of_links(&self, emitters: &Emitters) -> Option<Contradiction> {
+        let (rows, lights) = (self.tree.lights(), emitters.lights());
+        if emitters.link_sets().is_empty() && self.tree.light_links().is_empty() {
+            return None;
+        }
+        if rows.len() != lights.len() {
+            return Some(self.in_general("the number of lights"));
+        }
+        let differs = |(at, row): (usize, &LightRow)| {
+            let (light, told) = (&lights[at], (row.first_emitter, row.emitter_count));
+            let what = match self.tree.link_of(at) == light.link {
+                false => "its link",
+                true if told != (light.first, light.count) => "its emitters",
+                true => return None,
+            };
+            Some(Contradiction { path: light.path.clone(), what })
+        };
+        rows.par_iter().enumerate().find_map_first(differs)
     }
 
     /// The leaves of the lights that have trees of their own in every frame.

@@ -53,6 +53,10 @@ pub(super) fn of_still(
     hasher.update(&(emitters.lights().len() as u64).to_le_bytes());
     hasher.update(lists.as_flattened());
     hasher.update(&of_group(still, shared));
+    if !emitters.link_sets().is_empty() {
+        let links: Vec<u32> = emitters.lights().iter().map(|light| light.link).collect();
+        hasher.update(bytemuck::cast_slice(&links));
+    }
     *hasher.finalize().as_bytes()
 }
 

@@ -5,7 +5,7 @@ use super::build::algorithm_of;
 use super::frames::spell;
 use super::{Survey, frames_of, survey};
 use crate::emitter::{Emitters, LightOverflow};
-use crate::light_tree::{ALGORITHM_VERSION, LightSummary, LightTree, NoSuchFrame};
+use crate::light_tree::{ALGORITHM_VERSION, LightSummary, LightTree, NoSuchFrame, SameLinks};
 use crate::scene::Scene;
 use crate::store::{self, MappedFile, StoreError};
 use std::collections::BTreeMap;
@@ -292,19 +292,23 @@ fn compare<D: AsRef<[u8]>>(tree: &LightTree<D>, now: &[LightSummary], remedy: St
     let before: BTreeMap<&str, _> = tree
         .lights()
         .iter()
-        .map(|row| (tree.light_path(row), (row.fingerprint, row.class)))
+        .enumerate()
+        .map(|(at, row)| (tree.light_path(row), (row.fingerprint, row.class, tree.link_of(at))))
         .collect();
+    let content = |light: &LightSummary| (light.fingerprint, light.class, light.link);
     let after: BTreeMap<&str, _> =
-        now.iter().map(|light| (light.path.as_str(), (light.fingerprint, light.class))).collect();
+        now.iter().map(|light| (light.path.as_str(), content(light))).collect();
+    let mut links = SameLinks::default();
+    let mut is_dirtied = |path: &str, now: &([u8; 32], u32, u32)| {
+        let Some(then) = before.get(path) else { return false };
+        !links.agree(then.2, now.2) || (then.0, then.1) != (now.0, now.1)
+    };
     let names = |paths: &mut dyn Iterator<Item = &&str>| paths.map(|p| p.to_string()).collect();
     StaleTree {
         added: names(&mut after.keys().filter(|path| !before.contains_key(*path))),
         removed: names(&mut before.keys().filter(|path| !after.contains_key(*path))),
         dirtied: names(
-            &mut after
-                .iter()
-                .filter(|(path, now)| before.get(*path).is_some_and(|then| then != *now))
-                .map(|(path, _)| path),
+            &mut after.iter().filter(|(path, now)| is_dirtied(path, now)).map(|(path, _)| path),
         ),
         remedy,
     }

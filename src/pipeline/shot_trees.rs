@@ -123,7 +123,9 @@ impl CheckedFile<'_> {
             return Err(self.stale()?);
         }
         let TreeFile { path, forced, .. } = self.file;
-        match self.agreement(surveyor, &[]).of_numbering(self.emitters) {
+        let agreement = self.agreement(surveyor, &[]);
+        let of_links = || agreement.of_links(self.emitters);
+        match agreement.of_numbering(self.emitters).or_else(of_links) {
             Some(cause) => Err(contradicts(tree, path, self.scene, forced, cause)),
             None => Ok(()),
         }
@@ -197,7 +199,7 @@ impl CheckedFile<'_> {
 
 /// Trees, built as frames are asked for.
 struct BuiltTrees {
-    /// One for each class.
+    /// One for each run of lights of one class and link number.
     lights: Vec<LightSummary>,
     /// The frame that was last asked for, and its trees.
     last: Option<(i32, LightTree<AlignedBytes>)>,
@@ -214,8 +216,10 @@ impl BuiltTrees {
             energy: 0.0,
             class: class_of(&lights[0]),
             look: LightLook::default(),
+            link: lights[0].link,
         };
-        let classes = emitters.lights().chunk_by(|a, b| class_of(a) == class_of(b));
+        let key = |light: &LightEntry| (class_of(light), light.link);
+        let classes = emitters.lights().chunk_by(|a, b| key(a) == key(b));
         BuiltTrees { lights: classes.map(class).collect(), last: None }
     }
 

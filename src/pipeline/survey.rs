@@ -174,6 +174,7 @@ impl Survey {
                 energy: energy.min(f64::from(f32::MAX)) as f32,
                 class: class_of(light),
                 look: looks[row],
+                link: light.link,
             }
         };
         emitters.lights().par_iter().enumerate().map(summary).collect()

@@ -5,6 +5,7 @@ use super::camera::CameraRays;
 use super::film::{Film, Shown, half_of};
 use super::fog::Fog;
 use super::layers::Aov;
+use super::links::{FrameLinks, ShotLinks};
 use super::motion::Motion;
 use super::passes::{Control, Progress, Uniform};
 use super::path::{Integrator, PathScratch, TraceStats};
@@ -30,6 +31,7 @@ pub struct RenderDelegate<'a> {
     emitters: &'a Emitters,
     geometry: RayScene,
     skies: Skies,
+    links: Option<ShotLinks<'a>>,
     settings: RenderSettings,
     plan: Result<Plan, PlanError>,
     camera: Camera,
@@ -85,6 +87,7 @@ impl<'a> RenderDelegate<'a> {
             emitters,
             geometry: RayScene::new(scene, &scene.pose_at(0.0)),
             skies: Skies::default(),
+            links: ShotLinks::new(scene, emitters),
             plan: Plan::new(scene, emitters, &settings),
             settings,
             camera,
@@ -139,11 +142,15 @@ impl<'a> RenderDelegate<'a> {
         let infinite = self.skies.lights(self.scene, &pose);
         assert_eq!(tree.emitter_count(), self.emitters.len(), "the tree belongs to another scene");
         let learned = learned.filter(|learned| learned.tree == tree.still_key());
-        let tree = tree.at_frame(frame)?;
+        let tree = match &self.links {
+            Some(links) => tree.at_frame_linked(frame, links.lit_by())?,
+            None => tree.at_frame(frame)?,
+        };
         let tree = match learned {
             Some(learned) => tree.veiled(learned.veils),
             None => tree,
         };
+        let links = self.links.as_ref().map(|shot| FrameLinks { shot, infinite: &infinite });
         let (width, height) = (self.settings.width, self.settings.height);
         Ok(work(&Integrator {
             settings: &self.settings,
@@ -151,7 +158,8 @@ impl<'a> RenderDelegate<'a> {
             surfaces: Surfaces::new(self.scene, &pose),
             emitters: PosedEmitters { scene: self.scene, emitters: self.emitters, pose: &pose },
             infinite: &infinite,
-            picker: LightPicker::new(&self.settings, tree, &infinite),
+            picker: LightPicker::new(&self.settings, tree, &infinite).linked(links),
+            links,
             camera: CameraRays::new(&self.camera, &pose, width, height),
             cells: learned.map(|learned| learned.cells),
             fog: Fog::new(self.scene, &pose, &self.camera),

@@ -2,7 +2,7 @@
 
 use super::path::{Integrator, PathScratch, TraceStats, Vertex};
 use super::picker::{LightPick, PickScratch, Wanted};
-use super::rays::Anchor;
+use super::rays::{Anchor, Caster};
 use crate::light_tree::{Picked, Splitting};
 use crate::math::built_in;
 use crate::math::color::{Rgb, luminance};
@@ -21,6 +21,8 @@ pub struct Incoming {
     pub from: Option<Anchor>,
     /// Whether a reflected ray in this direction would hit the light, too.
     pub is_seen: bool,
+    /// The link set that casts shadows from the light; `None` is everything.
+    pub shadow_set: Option<u32>,
 }
 
 impl Integrator<'_> {
@@ -116,14 +118,24 @@ impl Integrator<'_> {
     /// Samples a picked light as seen from a point. Infinite lights are sampled on the side of the normal
     /// only, or all around if it is zero.
     pub fn incoming(&self, light: Picked, point: Vec3, normal: Vec3, u: Vec2) -> Option<Incoming> {
+        let shadow_set = self.links.and_then(|links| links.shadow_set(light));
+        // Light that passes what a reflected ray would hit is found by sampling alone.
+        let by_reflection = shadow_set.is_none();
         let emitter = match light {
             Picked::Emitter(emitter) => emitter,
             Picked::Beside(row) => {
                 let light = &self.infinite[row as usize];
                 let s = light.sample(normal, u)?;
                 let (direction, radiance, pdf) = (s.direction, s.radiance, s.pdf);
-                let is_seen = light.visibility.reflections;
-                return Some(Incoming { direction, radiance, pdf, from: None, is_seen });
+                let is_seen = light.visibility.reflections && by_reflection;
+                return Some(Incoming {
+                    direction,
+                    radiance,
+                    pdf,
+                    from: None,
+                    is_seen,
+                    shadow_set,
+                });
             }
         };
         let s = self.emitters.sample(emitter, point, u)?;
@@ -140,7 +152,8 @@ impl Integrator<'_> {
             radiance: s.radiance * coverage,
             pdf: s.pdf,
             from: Some(from),
-            is_seen: s.is_seen,
+            is_seen: s.is_seen && by_reflection,
+            shadow_set,
         })
     }
 
@@ -153,14 +166,14 @@ impl Integrator<'_> {
         accept: &impl Fn(u32, u32, Vec2) -> bool,
     ) -> Rgb {
         let direction = incoming.direction;
-        let (blocked, length) = match &incoming.from {
-            Some(light) => (
-                self.tracer.occluded_between(at, light, accept),
-                (light.position - at.position).length(),
-            ),
-            None => {
-                let origin = at.origin_toward(direction);
-                (self.tracer.occluded(origin, direction, f32::INFINITY, accept), f32::INFINITY)
+        let length = match &incoming.from {
+            Some(light) => (light.position - at.position).length(),
+            None => f32::INFINITY,
+        };
+        let blocked = match self.links.zip(incoming.shadow_set) {
+            None => self.is_blocked(at, incoming, accept, &|_| true),
+            Some((links, set)) => {
+                self.is_blocked(at, incoming, accept, &|caster| links.casts(set, caster))
             }
         };
         if blocked {
@@ -168,6 +181,24 @@ impl Integrator<'_> {
         }
         let through = |fog: &super::fog::Fog| fog.transmittance(at.position, direction, length);
         self.fog.as_ref().filter(|_| built_in::FOG).map_or(Rgb::ONE, through)
+    }
+
+    /// Whether any prim that `casts` names is between a point and a light.
+    fn is_blocked(
+        &self,
+        at: &Anchor,
+        incoming: &Incoming,
+        accept: &impl Fn(u32, u32, Vec2) -> bool,
+        casts: &impl Fn(Caster) -> bool,
+    ) -> bool {
+        let direction = incoming.direction;
+        match &incoming.from {
+            Some(light) => self.tracer.occluded_between_by(at, light, accept, casts),
+            None => {
+                let origin = at.origin_toward(direction);
+                self.tracer.occluded_by(origin, direction, f32::INFINITY, accept, casts)
+            }
+        }
     }
 }
 

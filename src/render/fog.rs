@@ -17,7 +17,7 @@ use super::direct::another;
 use super::path::{Integrator, PathScratch, TraceStats};
 use super::picker::{PickScratch, Site, Wanted};
 use super::rays::Anchor;
-use crate::light_tree::{Cell, Picked, Segment, Splitting};
+use crate::light_tree::{Cell, Picked, ReceiverClass, Segment, Splitting};
 use crate::math::color::{Rgb, luminance};
 use crate::scene::{Camera, Medium, Pose, Scene};
 use glam::{DAffine3, DVec3, Vec2, Vec3};
@@ -188,7 +188,8 @@ impl Integrator<'_> {
         let (origin, length) = (stretch.origin.as_vec3(), stretch.length as f32);
         let segment = Segment { origin, direction, length };
         let site = Site::Along(segment, (lost / extinction) as f32);
-        let wanted = Wanted { site, cell: Cell::NONE };
+        let class = self.links.map_or(ReceiverClass::ALL, |links| links.of_fog());
+        let wanted = Wanted { site, cell: Cell::NONE, class };
         let mut sum = Rgb::ZERO;
         let PathScratch { picks, stats, by_group, blocked, trial, .. } = scratch;
         let how = self.picker.splitting(bounce);

@@ -9,6 +9,7 @@
 //! | [`delegate`] | what is done once for a shot, and what for each frame? |
 //! | [`path`], `walk` | how does light get from a lamp to the eye, and where are its vertices? |
 //! | [`direct`], [`fog`] | what do picked lights give a surface, what a stretch of fog? |
+//! | [`links`] | which lights light a surface, and what casts their shadows? |
 //! | [`picker`] | which lights are sampled there, and how often is each expected to be? |
 //! | [`knob`] | how readily are clusters split, if nobody says? |
 //! | [`camera`] | which ray belongs to a point of the picture? |
@@ -41,6 +42,7 @@ pub mod frames;
 pub mod knob;
 pub mod layers;
 pub mod light_groups;
+pub mod links;
 mod motion;
 pub mod noise;
 mod parts;

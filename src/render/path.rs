@@ -12,13 +12,14 @@ use super::direct::power_heuristic;
 use super::fog::Fog;
 use super::knob::Trial;
 use super::light_groups::LightGroups;
+use super::links::FrameLinks;
 use super::picker::{LightPicker, PickScratch, Site, Wanted};
 use super::rays::{Anchor, Hit, HitSurface, Seen, SeenLight, Sender, Tracer};
 use super::settings::RenderSettings;
 use super::surface::Surfaces;
 use crate::emitter::{EmitterHit, InfiniteLight, PosedEmitters};
 use crate::light_tree::learned::Cells;
-use crate::light_tree::{Cell, Glossy, Lobes, Picked, Receiver, Splitting};
+use crate::light_tree::{Cell, Glossy, Lobes, Picked, Receiver, ReceiverClass, Splitting};
 use crate::math::built_in;
 use crate::math::color::Rgb;
 use crate::math::random::{Sampler, hash};
@@ -48,6 +49,8 @@ pub struct Integrator<'a> {
     pub camera: CameraRays,
     /// Where what is known to be hidden is known, if it is.
     pub cells: Option<Cells<'a>>,
+    /// Which lights light what, if not all light everything.
+    pub links: Option<FrameLinks<'a>>,
     /// What fills the space, if anything does.
     pub fog: Option<Fog>,
     /// Which light group each light is in, if that is asked for.
@@ -127,6 +130,8 @@ pub struct Vertex {
     pub wo: Vec3,
     /// What the tree is asked for.
     pub receiver: Receiver,
+    /// Which lights light it.
+    pub class: ReceiverClass,
 }
 
 /// A thread's buffers, reused from path to path.
@@ -263,14 +268,15 @@ impl Integrator<'_> {
         let surface = self.surfaces.at(instance, triangle, barycentric, hit.anchor, wo);
         let receiver = Receiver { point: hit.anchor.position, normal: surface.frame.normal };
         let reflection = surface.bsdf().toward(wo);
-        Some(Vertex { anchor: hit.anchor, reflection, wo, receiver })
+        let class = self.links.map_or(ReceiverClass::ALL, |links| links.of_instance(instance));
+        Some(Vertex { anchor: hit.anchor, reflection, wo, receiver, class })
     }
 
     /// What lights are picked for at a vertex.
     fn wanted(&self, vertex: &Vertex, sampler: &mut Sampler, salt: u32) -> Wanted {
         let wanted = match self.picker.looks() {
             true => vertex.wanted(self.picker.asks_for_direction().then_some(sampler)),
-            false => Wanted { site: Site::At(vertex.receiver), cell: Cell::NONE },
+            false => vertex.wanted_at(Site::At(vertex.receiver)),
         };
         Wanted { cell: self.cell(vertex, salt), ..wanted }
     }
@@ -334,6 +340,9 @@ impl Integrator<'_> {
             return Rgb::ZERO;
         }
         let light = Picked::Emitter(emitter);
+        if !self.is_found(before, light) {
+            return Rgb::ZERO;
+        }
         let weight = before.as_ref().map_or(1.0, |before| {
             let pdf = || self.emitters.pdf(&at, before.point);
             self.weight_of_hit(before, light, scratch, pdf)
@@ -360,6 +369,9 @@ impl Integrator<'_> {
                 continue;
             }
             let picked = Picked::Beside(row as u32);
+            if !self.is_found(before, picked) {
+                continue;
+            }
             let weight = before.as_ref().map_or(1.0, |before| {
                 self.weight_of_hit(before, picked, scratch, || light.pdf(before.normal, direction))
             });
@@ -368,6 +380,13 @@ impl Integrator<'_> {
             sum += light;
         }
         sum
+    }
+
+    /// Whether a ray finds a light that it meets: the eye's always, a reflected one if the light lights what the ray
+    /// left, and its shadows are those of everything.
+    fn is_found(&self, before: &Option<Origin>, light: Picked) -> bool {
+        let Some((links, before)) = self.links.as_ref().zip(before.as_ref()) else { return true };
+        links.reflections_find(before.wanted.class, light)
     }
 
     /// The weight of a reflected ray that hit a light, against picking and sampling that light.
@@ -395,7 +414,7 @@ impl Vertex {
         let is_glossy =
             |lobes: &Lobes| built_in::GLOSSY && lobes.at_normal + lobes.toward_grazing > 0.0;
         let Some(lobes) = self.reflection.lobes().filter(is_glossy) else {
-            return Wanted { site: Site::At(receiver), cell: Cell::NONE };
+            return self.wanted_at(Site::At(receiver));
         };
         // Independent of the direction in which the path continues: that one may hit a light, whose
         // weight must not depend on the direction.
@@ -405,7 +424,11 @@ impl Vertex {
         });
         let toward = drawn.map_or(receiver.normal, |sample| sample.wi);
         let glossy = Glossy { receiver, to_eye: self.wo, lobes, toward };
-        Wanted { site: Site::Glossy(glossy), cell: Cell::NONE }
+        self.wanted_at(Site::Glossy(glossy))
+    }
+
+    fn wanted_at(&self, site: Site) -> Wanted {
+        Wanted { site, cell: Cell::NONE, class: self.class }
     }
 
     /// Whether `wi` is on the same side as `wo` of the geometric surface, and not only of the shading

@@ -5,11 +5,12 @@
 //! Forced lights bypass the strategy: each is always sampled.
 
 use super::knob::Knobs;
+use super::links::FrameLinks;
 use super::settings::{LightStrategy, RenderSettings};
 use crate::emitter::InfiniteLight;
 use crate::light_tree::{
-    Cell, DistanceOnly, FrameTree, Glossy, Moments, Pick, Picked, Receiver, Scratch, Segment,
-    SplitTest, Splitting, Veiled, Viewer,
+    Cell, DistanceOnly, FrameTree, Glossy, Linked, Moments, Pick, Picked, Receiver, ReceiverClass,
+    Scratch, Segment, SplitTest, Splitting, Veiled, Viewer,
 };
 use crate::math::built_in;
 use crate::math::random::{hash, widen};
@@ -28,13 +29,15 @@ pub struct LightPick {
     pub weighed: u32,
 }
 
-/// What light is wanted for, and the cell that tells what is hidden from there.
+/// What light is wanted for, and what is known of it.
 #[derive(Clone, Copy, Debug)]
 pub struct Wanted {
     /// What for.
     pub site: Site,
-    /// The cell; [`Cell::NONE`] if nothing is known.
+    /// The cell that tells what is hidden from there; [`Cell::NONE`] if nothing is known.
     pub cell: Cell,
+    /// The class that tells which lights light it.
+    pub class: ReceiverClass,
 }
 
 /// What light is wanted for.
@@ -57,11 +60,30 @@ pub struct PickScratch {
 
 #[derive(Debug, Default)]
 struct TreeScratch {
-    at: Scratch<Veiled<Receiver>>,
-    glossy: Scratch<Veiled<Glossy>>,
-    along: Scratch<Veiled<Segment>>,
-    distance_at: Scratch<Veiled<DistanceOnly<Receiver>>>,
-    distance_along: Scratch<Veiled<DistanceOnly<Segment>>>,
+    at: Room<Receiver>,
+    glossy: Room<Glossy>,
+    along: Room<Segment>,
+    distance_at: Room<DistanceOnly<Receiver>>,
+    distance_along: Room<DistanceOnly<Segment>>,
+}
+
+/// Buffers for viewers of a kind: those that all lights light, and the others.
+#[derive(Debug)]
+struct Room<V> {
+    plain: Scratch<Veiled<V>>,
+    linked: Scratch<Linked<Veiled<V>>>,
+}
+
+impl<V> Default for Room<V> {
+    fn default() -> Self {
+        Room { plain: Scratch::default(), linked: Scratch::default() }
+    }
+}
+
+impl<V> Room<V> {
+    fn weighed(&self) -> u64 {
+        self.plain.weighed + self.linked.weighed
+    }
 }
 
 /// Evaluates an expression with the viewer that something is wanted for, and its room in the scratch.
@@ -69,30 +91,31 @@ macro_rules! with_viewer {
     ($picker:expr, $wanted:expr, $scratch:expr, |$viewer:ident, $room:ident| $body:expr) => {{
         let scratch: &mut TreeScratch = $scratch;
         let by_distance = $picker.strategy == LightStrategy::Distance;
-        let Wanted { site, cell } = *$wanted;
+        let Wanted { site, cell, class } = *$wanted;
+        // Whom all lights light is asked nothing about links.
+        macro_rules! with {
+            ($one:expr, $of_kind:expr) => {{
+                let (viewer, room) = (Veiled { viewer: $one, cell }, $of_kind);
+                if class == ReceiverClass::ALL {
+                    let ($viewer, $room) = (&viewer, &mut room.plain);
+                    $body
+                } else {
+                    let ($viewer, $room) = (&Linked { viewer, class }, &mut room.linked);
+                    $body
+                }
+            }};
+        }
         match site {
             Site::At(receiver) | Site::Glossy(Glossy { receiver, .. }) if by_distance => {
                 let viewer = DistanceOnly(Receiver { normal: Vec3::ZERO, ..receiver });
-                let ($viewer, $room) = (&Veiled { viewer, cell }, &mut scratch.distance_at);
-                $body
+                with!(viewer, &mut scratch.distance_at)
             }
             Site::Along(segment, _) if by_distance => {
-                let viewer = DistanceOnly(segment);
-                let ($viewer, $room) = (&Veiled { viewer, cell }, &mut scratch.distance_along);
-                $body
+                with!(DistanceOnly(segment), &mut scratch.distance_along)
             }
-            Site::At(viewer) => {
-                let ($viewer, $room) = (&Veiled { viewer, cell }, &mut scratch.at);
-                $body
-            }
-            Site::Glossy(viewer) => {
-                let ($viewer, $room) = (&Veiled { viewer, cell }, &mut scratch.glossy);
-                $body
-            }
-            Site::Along(viewer, _) => {
-                let ($viewer, $room) = (&Veiled { viewer, cell }, &mut scratch.along);
-                $body
-            }
+            Site::At(viewer) => with!(viewer, &mut scratch.at),
+            Site::Glossy(viewer) => with!(viewer, &mut scratch.glossy),
+            Site::Along(viewer, _) => with!(viewer, &mut scratch.along),
         }
     }};
 }
@@ -104,6 +127,8 @@ pub struct LightPicker<'a> {
     splitting: [Splitting; Knobs::KINDS],
     tree: FrameTree<'a>,
     infinite: &'a [InfiniteLight<'a>],
+    /// Which lights light what, if not all light everything.
+    links: Option<FrameLinks<'a>>,
     /// Running sums of energy over emitters, then lights at infinity; only for the power strategy.
     running_power: Vec<f64>,
 }
@@ -112,8 +137,8 @@ impl PickScratch {
     /// Groups weighed to open the tree, since this was made.
     pub fn weighed(&self) -> u64 {
         let TreeScratch { at, glossy, along, distance_at, distance_along } = &self.tree;
-        let by_distance = distance_at.weighed + distance_along.weighed;
-        at.weighed + glossy.weighed + along.weighed + by_distance
+        let by_distance = distance_at.weighed() + distance_along.weighed();
+        at.weighed() + glossy.weighed() + along.weighed() + by_distance
     }
 }
 
@@ -128,7 +153,18 @@ impl<'a> LightPicker<'a> {
         let by_power = strategy == LightStrategy::Power;
         let running_power = if by_power { running_power(&tree, infinite) } else { Vec::new() };
         let splitting = std::array::from_fn(|bounce| settings.splitting(bounce as u32));
-        LightPicker { strategy, splitting, tree, infinite, running_power }
+        LightPicker { strategy, splitting, tree, infinite, links: None, running_power }
+    }
+
+    /// The same, with the links of the frame. The tree must be [of them](crate::light_tree::LightTree::at_frame_linked).
+    pub fn linked(self, links: Option<FrameLinks<'a>>) -> LightPicker<'a> {
+        LightPicker { links, ..self }
+    }
+
+    /// Whether a light lights what something is wanted for.
+    #[inline]
+    fn lights(&self, wanted: &Wanted, light: Picked) -> bool {
+        self.links.as_ref().is_none_or(|links| links.lights(wanted.class, light))
     }
 
     /// The tree that is picked from.
@@ -173,10 +209,11 @@ impl<'a> LightPicker<'a> {
         let u = widen(u, salt);
         self.pick_forced(wanted, u, salt, &mut visit);
         match self.strategy {
-            LightStrategy::Uniform | LightStrategy::Power => self.pick_blindly(u, visit),
+            LightStrategy::Uniform | LightStrategy::Power => self.pick_blindly(wanted, u, visit),
             LightStrategy::All => {
                 let one = |light| LightPick { light, probability: 1.0, expected: 1.0, weighed: 0 };
-                (0..self.count()).for_each(|at| visit(one(self.light(at))));
+                let all = (0..self.count()).map(|at| self.light(at));
+                all.filter(|&light| self.lights(wanted, light)).for_each(|light| visit(one(light)));
             }
             LightStrategy::Exhaustive => self.pick_exhaustively(wanted, u, visit),
             LightStrategy::Tree | LightStrategy::Distance => {
@@ -198,6 +235,7 @@ impl<'a> LightPicker<'a> {
         scratch: &mut PickScratch,
     ) -> f64 {
         match light {
+            _ if !self.lights(wanted, light) => return 0.0,
             Picked::Beside(row) if self.infinite[row as usize].forced => return 1.0,
             Picked::Emitter(emitter) if emitter >= self.tree.unforced_count() => {
                 return with_viewer!(self, wanted, &mut scratch.tree, |viewer, _room| {
@@ -269,6 +307,9 @@ impl<'a> LightPicker<'a> {
         }
         for (row, _) in (0..).zip(self.infinite).filter(|(_, light)| light.forced) {
             let light = Picked::Beside(row);
+            if !self.lights(wanted, light) {
+                continue;
+            }
             visit(LightPick { light, probability: 1.0, expected: 1.0, weighed: 0 });
         }
     }
@@ -290,8 +331,8 @@ impl<'a> LightPicker<'a> {
         }
     }
 
-    /// Picks with probabilities that are the same for every viewer.
-    fn pick_blindly(&self, u: f64, mut visit: impl FnMut(LightPick)) {
+    /// Picks with probabilities that are the same for every viewer; nothing, if the light does not light it.
+    fn pick_blindly(&self, wanted: &Wanted, u: f64, mut visit: impl FnMut(LightPick)) {
         let Some(last) = self.count().checked_sub(1) else { return };
         let at = match self.running_power.last() {
             Some(total) => self.running_power.partition_point(|&end| end <= u * total) as u32,
@@ -299,7 +340,7 @@ impl<'a> LightPicker<'a> {
         };
         let light = self.light(at.min(last));
         let probability = self.blind_probability(light);
-        if probability > 0.0 {
+        if probability > 0.0 && self.lights(wanted, light) {
             visit(LightPick { light, probability, expected: probability, weighed: 0 });
         }
     }
@@ -373,6 +414,9 @@ impl<'a> LightPicker<'a> {
     }
 
     fn importance_beside(&self, row: usize, light: &InfiniteLight, wanted: &Wanted) -> f64 {
+        if !self.lights(wanted, Picked::Beside(row as u32)) {
+            return 0.0;
+        }
         importance_of(light, &wanted.site) * self.tree.weight_beside(wanted.cell, row)
     }
 }

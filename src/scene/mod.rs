@@ -13,6 +13,7 @@
 //! | [`instances`](Scene::instances) | a mesh put at a node: what a ray can hit |
 //! | [`lights`](Scene::lights) | lights that are not meshes: points, spots, spheres, suns, domes |
 //! | [`light_groups`](Scene::light_groups) | a name for the lights at a node and below |
+//! | [`linking`](Scene::linking) | what lights light, and what casts their shadows, where that is not everything |
 //! | [`medium`](Scene::medium) | the fog that fills it, or a box of it; one or none |
 //! | [`cameras`](Scene::cameras) | a view from a node |
 //! | [`notes`](Scene::notes) | what the file holds and the scene does not |
@@ -24,6 +25,7 @@
 
 mod camera;
 mod light;
+mod linking;
 mod material;
 mod medium;
 mod mesh;
@@ -40,6 +42,7 @@ mod visibility;
 
 pub use camera::{Camera, Projection};
 pub use light::{Light, LightKind, Shaping};
+pub use linking::{LinkRows, Linking, Links, Membership};
 pub use material::{AlphaMode, Material};
 pub use medium::{FogBox, Medium};
 pub use mesh::{Instance, Mesh};
@@ -77,6 +80,8 @@ pub struct Scene {
     pub lights: Vec<Light>,
     /// Light groups by node: of the lights at it, and of those below that have none of their own.
     pub light_groups: BTreeMap<u32, String>,
+    /// Which lights light what, and what casts shadows from them.
+    pub linking: Linking,
     /// The fog in it, if there is any.
     pub medium: Option<Medium>,
     /// Cameras, in the file's order.

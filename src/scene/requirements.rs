@@ -32,6 +32,10 @@ pub struct Requirements {
     pub forced: usize,
     /// Mesh lights, spheres and lights at infinity that some rays do not meet.
     pub hidden: usize,
+    /// Mesh lights and other lights that do not light everything.
+    pub light_links: usize,
+    /// Those from which not everything casts shadows.
+    pub shadow_links: usize,
     /// Meshes that more than one instance shares.
     pub shared_meshes: usize,
     /// Nodes that move.
@@ -69,6 +73,14 @@ impl Requirements {
                 needs.forced += usize::from(instance.forced);
                 needs.hidden += usize::from(instance.visibility != Visibility::ALL);
             }
+        }
+        let linking = &scene.linking;
+        let of_meshes = linking
+            .linked_instances()
+            .filter(|&(row, _)| scene.peak_rgb_of_instance(row).max_element() > 0.0);
+        for (_, links) in of_meshes.chain(linking.linked_lights()) {
+            needs.light_links += usize::from(links.light.is_some());
+            needs.shadow_links += usize::from(links.shadow.is_some());
         }
         needs.shared_meshes = uses.iter().filter(|&&count| count > 1).count();
         for light in &scene.lights {

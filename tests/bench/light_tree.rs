@@ -55,6 +55,7 @@ fn build(bounds: &[LightBounds]) -> AlignedBytes {
         energy: 1.0,
         class: 0,
         look: LightLook::default(),
+        link: 0,
     };
     writer.finish(&LightList::new(&[light]), "{}", [0; 32])
 }

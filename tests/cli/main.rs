@@ -11,6 +11,7 @@ mod layers;
 mod learned;
 mod lies;
 mod lights;
+mod links;
 mod measure;
 mod names;
 mod notes;

@@ -2,4 +2,5 @@
 
 mod edits;
 mod laws;
+mod links;
 mod street;

@@ -32,6 +32,7 @@ fn points(count: u32) -> Parts {
         energy: count as f32,
         class: 0,
         look: LightLook::default(),
+        link: 0,
     };
     Parts::of(writer.finish(&LightList::new(&[light]), "{}", [0; 32]).as_ref())
 }

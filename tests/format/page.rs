@@ -1,6 +1,7 @@
 //! The specification is enough: a reader that was written from it alone, in another language, reads what
 //! the library reads.
 
+use crate::bytes::Parts;
 use crate::golden::path;
 use candelabra::light_tree::{LightRow, LightTree, Link, Node, Receiver};
 use candelabra::pipeline;
@@ -19,6 +20,9 @@ pub struct Report {
     /// Of every used lane: box, axis, angles, sides, energy, range.
     nodes: Vec<ReportedNode>,
     frames: Vec<ReportedFrame>,
+    /// The link number of each light, if the file tells.
+    #[serde(default)]
+    links: Vec<u32>,
 }
 
 #[derive(Debug, Serialize, Deserialize)]
@@ -102,6 +106,7 @@ pub fn report<D: AsRef<[u8]>>(tree: &LightTree<D>) -> Report {
         lights: tree.lights().iter().map(light).collect(),
         nodes: tree.groups().iter().flat_map(|group| group.nodes()).map(node).collect(),
         frames: numbers.into_iter().map(frame).collect(),
+        links: tree.light_links().to_vec(),
     }
 }
 
@@ -178,6 +183,32 @@ fn a_reader_from_the_page_reads_what_the_library_reads() {
     for name in trees {
         let tree = pipeline::open_tree(&path(name), true).unwrap();
         read_in_python(&path(name)).unwrap().assert_is(&report(&tree));
+    }
+}
+
+/// The reader knows what link numbers are, too.
+#[test]
+fn it_reads_links_and_refuses_wrong_ones() {
+    if !python() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("linked.ltree");
+    let lights = crate::golden::golden().lights().len() as u32;
+    let sound: Vec<u32> = (0..lights).map(|row| row.min(3)).collect();
+    for (numbers, rule) in
+        [(sound.clone(), ""), (sound[1..].to_vec(), "LINK 1"), (vec![2; sound.len()], "LINK 2")]
+    {
+        let mut parts = Parts::of(&crate::golden::golden_bytes());
+        crate::rules::linked(&mut parts, &numbers);
+        std::fs::write(&file, parts.file().as_ref()).unwrap();
+        match read_in_python(&file) {
+            Ok(read) => {
+                assert_eq!((rule, &read.links), ("", &numbers));
+                read.assert_is(&report(&pipeline::open_tree(&file, true).unwrap()));
+            }
+            Err(complaint) => assert!(complaint.contains(&format!("rule {rule}\n")), "{complaint}"),
+        }
     }
 }
 

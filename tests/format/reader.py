@@ -14,7 +14,7 @@ import zlib
 
 MAGIC = b"\x89LTR\r\n\x1a\n"
 KNOWN = {"META": 1, "TREE": 48, "GRUP": 256, "INST": 64, "FRAM": 16, "FORC": 4, "LGHT": 64, "PATH": 1}
-KNOWN |= {"FPRT": 32, "TXTR": 40, "MEAN": 16}
+KNOWN |= {"FPRT": 32, "TXTR": 40, "MEAN": 16, "LINK": 4}
 ALWAYS = ("TREE", "GRUP", "LGHT", "PATH")
 NO_TREE = 0xFFFFFFFF
 STILL = 1
@@ -151,6 +151,7 @@ class File:
         self.forced = [entry for (entry,) in struct.iter_unpack("<I", s.get("FORC", b""))]
         self.textures = [(r[:32], *struct.unpack("<2I", r[32:])) for r in rows("TXTR", 40)]
         self.means = [struct.unpack("<I3f", r) for r in rows("MEAN", 16)]
+        self.links = [entry for (entry,) in struct.iter_unpack("<I", s["LINK"])] if "LINK" in s else None
         self.lights = []
         for r in rows("LGHT", 64):
             first, count, offset, length, energy, kind = struct.unpack_from("<4IfI", r, 32)
@@ -199,9 +200,20 @@ class File:
         for _, *mean in self.means:
             require(all(math.isfinite(part) and part >= 0 for part in mean) and any(mean), "MEAN 1")
 
+    def check_links(self):
+        if self.links is None:
+            return
+        require(len(self.links) == len(self.lights), "LINK 1")
+        following = 1
+        for number in self.links:
+            require(number <= following, "LINK 2")
+            following += number == following
+        require(following > 1, "LINK 3")
+
     def check(self):
-        """The textures; the frames' fingerprints; every tree, and that it holds just its lights."""
+        """The textures and links; the frames' fingerprints; every tree, and that it holds just its lights."""
         self.check_textures()
+        self.check_links()
         require(len(self.fingerprints) in (0, len(self.frames or [])), "FPRT 1")
         groups = 0
         for row, (first, count, _leaves, kind, _root) in enumerate(self.trees):
@@ -275,6 +287,7 @@ class File:
             "lights": [[path, fingerprint.hex(), *rest] for path, fingerprint, *rest in self.lights],
             "nodes": [node.report() for node in nodes],
             "frames": frames,
+            "links": self.links or [],
         }
 
 

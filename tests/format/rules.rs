@@ -2,7 +2,7 @@
 //!
 //! Rules about the header and the table have theirs in [`tables`](crate::tables).
 
-use crate::bytes::Parts;
+use crate::bytes::{Parts, Section};
 use crate::golden::{golden, golden_bytes};
 use candelabra::light_tree::{Group, LightTree, Link, RULES, TreeKind};
 use candelabra::store::{Record, Rule, Violation};
@@ -102,6 +102,7 @@ fn every_rule_is_asked_and_named_with_its_record() {
     groups(&mut cases);
     rows_of_the_rest(&mut cases);
     textures(&mut cases);
+    links(&mut cases);
     let whole = std::fs::read(crate::golden::path("frames.ltree")).unwrap();
     cases.breaks_of(&whole, "FPRT 1", Record::All, |p| p.section("FPRT").truncate(32));
     // Files so large are not made for a test.
@@ -236,6 +237,29 @@ fn rows_of_the_rest(cases: &mut Cases) {
     });
     let last = golden().lights().len() - 1;
     cases.breaks("LGHT 7", Record::All, |p| p.set("LGHT", light(last, 36), 1 << 30));
+}
+
+/// Gives the golden file link numbers.
+pub fn linked(parts: &mut Parts, numbers: &[u32]) {
+    let bytes = numbers.iter().flat_map(|number| number.to_le_bytes()).collect();
+    parts.sections.push(Section { name: *b"LINK", required: 0, element: 4, bytes });
+    parts.version = [1, 3];
+}
+
+fn links(cases: &mut Cases) {
+    let lights = golden().lights().len();
+    let numbers = |change: &dyn Fn(&mut [u32])| {
+        let mut numbers: Vec<u32> = (0..lights as u32).map(|row| row.min(2)).collect();
+        change(&mut numbers);
+        numbers
+    };
+    assert_eq!(broken(&golden_bytes(), |p| linked(p, &numbers(&|_| ()))), None);
+    cases.breaks("LINK 1", Record::All, |p| linked(p, &numbers(&|_| ())[1..]));
+    cases.breaks("LINK 1", Record::All, |p| linked(p, &[]));
+    cases.breaks("LINK 2", Record::Row(0), |p| linked(p, &numbers(&|all| all[0] = 2)));
+    cases.breaks("LINK 2", Record::Row(3), |p| linked(p, &numbers(&|all| all[3] = 4)));
+    cases.breaks("LINK 2", Record::Row(2), |p| linked(p, &numbers(&|all| all[2] = u32::MAX)));
+    cases.breaks("LINK 3", Record::All, |p| linked(p, &numbers(&|all| all.fill(0))));
 }
 
 fn textures(cases: &mut Cases) {

@@ -138,6 +138,7 @@ fn no_frames_are_no_frames() {
         energy: 1.0,
         class: 0,
         look: LightLook::default(),
+        link: 0,
     };
     let mut parts = Parts::of(writer.finish(&LightList::new(&[light]), "{}", [4; 32]).as_ref());
     let before = parts.file();
@@ -183,7 +184,7 @@ fn later_files_are_read_as_far_as_they_can_be() {
     assert_eq!(
         with(&|parts| {
             spare(parts);
-            parts.version = [1, 3];
+            parts.version = [1, 4];
         }),
         Ok(())
     );

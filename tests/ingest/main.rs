@@ -5,6 +5,7 @@ mod corpus;
 mod files;
 mod fog;
 mod gltf;
+mod links;
 mod malformed;
 mod mended;
 mod mended_textures;

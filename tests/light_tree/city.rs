@@ -1,6 +1,7 @@
 //! Trees as a shot has them: shared ones put in many places, one over what stands still, one of a
 //! frame above it, and forced lights of their own.
 
+use crate::linking::numbered;
 use crate::support::{Tree, direction, emitter, emitters, position};
 use candelabra::bounds::{Aabb, Cone, LightBounds};
 use candelabra::light_tree::{
@@ -81,6 +82,11 @@ impl City {
     /// The file, written in the order that the [format](candelabra::store) asks for. Frame 1 exists
     /// if anything changes; else any frame does.
     pub fn tree(&self) -> Tree {
+        self.tree_linked(|_| 0)
+    }
+
+    /// The same, with the link number of each row of lights.
+    pub fn tree_linked(&self, link: impl Fn(usize) -> u32) -> Tree {
         let mut writer = LightTreeWriter::default();
         for bounds in &self.shared {
             writer.add_tree(TreeKind::Shared, bounds, |i| Link::Emitter(i as u32));
@@ -108,6 +114,8 @@ impl City {
         } else {
             writer.add_forced(&forced);
         }
+        let of_lights = numbered((0..lights.len()).map(link));
+        lights.iter_mut().zip(of_lights).for_each(|(light, number)| light.link = number);
         LightTree::open(writer.finish(&LightList::new(&lights), "{}", [3; 32])).expect("it opens")
     }
 
@@ -178,6 +186,7 @@ fn summary(path: String, emitter_count: u32, class: u32) -> LightSummary {
         energy: 1.0,
         class,
         look: LightLook::default(),
+        link: 0,
     }
 }
 

@@ -30,8 +30,8 @@ impl Numbers {
 }
 
 /// Faces spread evenly over a box, with normals spread evenly over a cone, and a receiver outside the box's
-/// sphere: what reaches it on average over what its importance says, and over the largest cosines.
-fn told_over_true(numbers: &mut Numbers) -> (f64, f64) {
+/// sphere: what the importance says, and what reaches the receiver on average.
+fn told_and_sent(numbers: &mut Numbers) -> (f64, f64) {
     const FACES: usize = 4000;
     let half = DVec3::from_array([(); 3].map(|()| numbers.from_to(1e-3, 1.0)));
     let distance = half.length() * numbers.from_to(1.05, 30.0);
@@ -64,7 +64,7 @@ fn faces_send_on_average_what_the_importance_says() {
     let mut numbers = Numbers(1);
     let mut off: Vec<f64> = Vec::new();
     while off.len() < 2000 {
-        let (told, sent) = told_over_true(&mut numbers);
+        let (told, sent) = told_and_sent(&mut numbers);
         // Too few faces reach it to tell a mean.
         if sent > 1e-3 * told {
             off.push((told / sent).log2());
@@ -72,16 +72,10 @@ fn faces_send_on_average_what_the_importance_says() {
     }
     off.sort_by(f64::total_cmp);
     let at = |share: f64| off[(share * (off.len() - 1) as f64) as usize];
-    println!(
-        "octaves: {:.2} {:.2} {:.2} {:.2} {:.2}",
-        at(0.01),
-        at(0.1),
-        at(0.5),
-        at(0.9),
-        at(0.99)
-    );
-    assert!(at(0.5).abs() < 0.2 && at(0.1) > -0.5 && at(0.9) < 1.0, "{}, {}", at(0.1), at(0.9));
-    assert!(at(0.01) > -2.0, "what is told is far too little: {}", at(0.01));
+    println!("octaves: {:.2} {:.2} {:.2} {:.2}", at(0.01), at(0.1), at(0.5), at(0.75));
+    assert!(at(0.1) > -0.4 && at(0.5).abs() < 0.2 && at(0.75) < 1.0, "{} {}", at(0.1), at(0.75));
+    // Too little costs more than too much: what is left out is rare and bright.
+    assert!(at(0.01) > -1.5, "{}", at(0.01));
 }
 
 /// Where nothing is spread, nothing has to be guessed.

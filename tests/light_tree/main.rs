@@ -11,6 +11,7 @@ mod importance;
 mod incremental;
 mod instances;
 mod invariance;
+mod linking;
 mod measure;
 mod sampling;
 mod scenes;

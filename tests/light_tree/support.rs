@@ -23,6 +23,7 @@ pub fn tree_over(bounds: &[LightBounds]) -> Tree {
         energy: bounds.iter().map(|b| b.energy).sum(),
         class: 0,
         look: LightLook::default(),
+        link: 0,
     };
     LightTree::open(writer.finish(&LightList::new(&[light]), "{}", [2; 32]))
         .expect("a tree just written opens")

@@ -14,6 +14,7 @@ mod knobs;
 mod layers;
 mod learned;
 mod lens;
+mod linking;
 mod moving;
 mod noise;
 mod ranges;

@@ -194,6 +194,11 @@ fn print_tree(out: &mut impl Write, report: &TreeReport) -> Result<()> {
         counted(report.instances, "instance"),
         counted(report.frames.map_or(0, |frames| frames.count), "frame")
     )?;
+    if report.linked > 0 {
+        let (lights, sets) =
+            (counted(report.linked, "light"), counted(report.link_sets, "link set"));
+        writeln!(out, "  {lights} not for everything, in {sets}")?;
+    }
     writeln!(
         out,
         "  {:<8} {:>6} {:>10} {:>10} {:>7} {:>8} {:>11} {:>7}",

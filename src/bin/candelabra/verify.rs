@@ -141,5 +141,9 @@ fn summary(tree: &OpenedTree) -> String {
         (tree.trees().len(), "tree"),
         (tree.byte_length(), "byte"),
     ];
-    counts.map(|(count, what)| counted(count, what)).join(", ")
+    let mut text = counts.map(|(count, what)| counted(count, what)).join(", ");
+    if tree.link_numbers() > 1 {
+        text += &format!(", {}", counted(tree.link_numbers() as usize - 1, "link set"));
+    }
+    text
 }

@@ -1,6 +1,6 @@
 //! One change as a sentence.
 
-use crate::diff::{Change, Difference, Kind, LightCard, Verb};
+use crate::diff::{Change, Difference, Kind, LightCard, Relinked, Verb};
 use crate::page::{Short, Triple, counted};
 
 /// What is said of a change after its path.
@@ -80,6 +80,10 @@ fn amount(difference: &Difference, infinite: bool) -> String {
         Difference::Forced { after, .. } => {
             if after { "now forced" } else { "no longer forced" }.into()
         }
+        Difference::LightLink { ref prims } => format!("lights {}", relinked(prims.as_ref())),
+        Difference::ShadowLink { ref prims } => {
+            format!("is shadowed by {}", relinked(prims.as_ref()))
+        }
         Difference::OverTime { apart: Some(apart), .. } => {
             let parts = [
                 (apart.most_moved_m > 0.0).then(|| format!("{} m", short(apart.most_moved_m))),
@@ -98,4 +102,17 @@ fn amount(difference: &Difference, infinite: bool) -> String {
         .into(),
         Difference::Pattern => "pattern of its emission".into(),
     }
+}
+
+/// Which prims a set holds otherwise than before.
+fn relinked(prims: Option<&Relinked>) -> String {
+    let Some(Relinked { gained, gained_named, lost, lost_named }) = prims else {
+        return "others than before".into();
+    };
+    let one = |count: usize, named: &[String], word: &str| {
+        let more = if count > named.len() { ", ..." } else { "" };
+        (count > 0).then(|| format!("{count} {word} ({}{more})", named.join(", ")))
+    };
+    let parts = [one(*gained, gained_named, "more"), one(*lost, lost_named, "fewer")];
+    parts.into_iter().flatten().collect::<Vec<_>>().join(" and ")
 }

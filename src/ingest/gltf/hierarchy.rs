@@ -3,10 +3,11 @@
 use super::document::{Real, Transform, UsdFog, UsdLux, label, usd_path};
 use super::geometry::Meshes;
 use super::lights::{self, Placed};
+use super::links::LinkTable;
 use super::{Output, Source, animation, cameras, fog, instancing};
 use crate::ingest::error::Fault;
 use crate::ingest::paths::{PrimPaths, component};
-use crate::scene::{Category, Channel, Instance, Light, Node, Trs};
+use crate::scene::{Category, Channel, Instance, Light, Links, Node, Trs};
 use glam::{DAffine3, DMat4, DQuat, DVec3};
 use gltf::json::{Index, Mesh, Node as Row};
 use std::mem;
@@ -35,6 +36,7 @@ struct Walk<'a> {
     placed: Vec<Option<u32>>,
     meshes: Meshes,
     paths: PrimPaths,
+    links: LinkTable,
     /// For each node of the scene, whether neither it nor an ancestor ever scales unevenly.
     uniform: Vec<bool>,
 }
@@ -47,6 +49,7 @@ pub(super) fn compile(source: &Source, output: &mut Output) -> Result<(), Fault>
         placed: vec![None; source.document.nodes.len()],
         meshes: Meshes::new(source),
         paths: PrimPaths::default(),
+        links: LinkTable::default(),
         uniform: Vec::new(),
     };
     // A stack, so that no depth of the hierarchy is a depth of calls.
@@ -73,7 +76,7 @@ pub(super) fn compile(source: &Source, output: &mut Output) -> Result<(), Fault>
         let children = source.forest.children(number).iter().rev();
         stack.extend(children.map(|&child| open(child, Some(node), visible)));
     }
-    Ok(())
+    walk.links.finish(output)
 }
 
 impl Walk<'_> {
@@ -135,8 +138,14 @@ impl Walk<'_> {
         if let Some(camera) = row.camera {
             cameras::compile(self.source, output, camera, row, node, object);
         }
+        let membership = self.links.membership(output, &row.extras, None, object)?;
+        let had_fog = output.scene.medium.is_some();
         fog::of_node(output, &row.extras, node, object)?;
+        if !had_fog && output.scene.medium.is_some() {
+            self.links.set_medium(membership);
+        }
         let lux = UsdLux::of(&row.extras, object)?;
+        let links = Links { membership, ..self.links.of_light(lux.as_ref(), object)? };
         if let Some(group) = lux.as_ref().and_then(|lux| lux.group.as_ref()) {
             let bytes = size_of::<(u32, String)>() + group.len();
             output.budget.take(bytes as u64, || object.to_string())?;
@@ -146,6 +155,9 @@ impl Walk<'_> {
         let light = lights::of_node(self.source, output, number, lux.as_ref(), node, object)?
             .map(|light| Light { values: values.take(), ..light });
         let has_light = light.is_some();
+        if has_light {
+            self.links.add_light(output, links)?;
+        }
         output.scene.lights.extend(light);
         let shaping = lights::shaping(lux.as_ref(), object)?;
         let forced = lux.as_ref().is_some_and(|lux| lux.force);
@@ -166,7 +178,7 @@ impl Walk<'_> {
         }
         let (lux, values) = (lux.as_ref(), values.as_ref());
         let visibility = lights::visibility(lux);
-        let placed = Placed { lux, shaping, values, forced, visibility, has_light, object };
+        let placed = Placed { lux, shaping, values, forced, visibility, links, has_light, object };
         let Some(instances) = instances else {
             return self.put_mesh(output, mesh, node, &placed);
         };
@@ -204,6 +216,7 @@ impl Walk<'_> {
             {
                 let sphere = lights::sphere(material, radius, node, placed);
                 let values = placed.copy_values(output)?;
+                self.links.add_light(output, placed.links)?;
                 output.scene.lights.push(Light { values, ..sphere });
                 return Ok(());
             }
@@ -225,7 +238,7 @@ impl Walk<'_> {
                 None if placed.has_light => self.paths.claim(format!("{above}/mesh")),
                 None => above,
             };
-            let Placed { shaping, forced, visibility, .. } = *placed;
+            let Placed { shaping, forced, visibility, links, .. } = *placed;
             let bytes = size_of::<Instance>() + 2 * path.len();
             output.budget.take(bytes as u64, || placed.object.to_string())?;
             let values = placed.copy_values(output)?;
@@ -233,6 +246,9 @@ impl Walk<'_> {
                 let text = "its light varies, but its mesh has no material; dark";
                 output.notes.add(Category::Lights, placed.object, text);
             }
+            let (above, extras) = (links.membership, &row.primitives[i].extras);
+            let membership = self.links.membership(output, extras, above, placed.object)?;
+            self.links.add_instance(output, Links { membership, ..links })?;
             let lit = Instance { path, node, mesh, values, shaping, forced, visibility };
             output.scene.instances.push(lit);
         }

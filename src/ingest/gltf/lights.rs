@@ -6,7 +6,8 @@ use crate::ingest::error::Fault;
 use crate::ingest::image::{self, Coding};
 use crate::math::color::Rgb;
 use crate::scene::{
-    Category, Interpolation, Keys, Light, LightKind, Material, Shaping, Texture, Visibility, Wrap,
+    Category, Interpolation, Keys, Light, LightKind, Links, Material, Shaping, Texture, Visibility,
+    Wrap,
 };
 use gltf::json::extensions::scene::khr_lights_punctual::{Light as Row, Type};
 use gltf::json::validation::Checked;
@@ -24,6 +25,8 @@ pub(super) struct Placed<'a> {
     pub values: Option<&'a Keys<Rgb>>,
     pub forced: bool,
     pub visibility: Visibility,
+    /// Of the node's light and of its geometry.
+    pub links: Links,
     /// Whether a light has the node's path already.
     pub has_light: bool,
     pub object: &'a str,

@@ -16,6 +16,7 @@
 //! | `instancing`, `geometry`, `attributes` | meshes |
 //! | `materials`, `textures` | surfaces |
 //! | `lights`, `fog`, `cameras`, `animation` | what they say |
+//! | `links` | which lights light what |
 
 mod accessors;
 mod animation;
@@ -31,6 +32,7 @@ mod geometry;
 mod hierarchy;
 mod instancing;
 mod lights;
+mod links;
 mod materials;
 mod textures;
 

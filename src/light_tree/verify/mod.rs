@@ -5,6 +5,7 @@ mod contents;
 mod frame;
 mod groups;
 mod lights;
+mod links;
 pub(super) mod rules;
 mod textures;
 mod walkable;
@@ -58,7 +59,11 @@ impl<D: AsRef<[u8]> + Sync> LightTree<D> {
 
     fn verify_rules(&self) -> Checked {
         let trees = || self.verify_trees().and_then(|()| self.verify_instances());
-        let rows = || self.verify_lights().and_then(|()| self.verify_textures());
+        let rows = || {
+            self.verify_lights()
+                .and_then(|()| self.verify_textures())
+                .and_then(|()| self.verify_links())
+        };
         let (lights, trees) = rayon::join(rows, trees);
         lights?;
         trees?;

@@ -5,7 +5,7 @@ use crate::light_tree::records;
 use crate::store::{RULES_OF_HEADER, RULES_OF_TABLE, Rule, rules};
 
 /// All rules that a tree file keeps, part by part.
-pub const RULES: [&[Rule]; 11] = [
+pub const RULES: [&[Rule]; 12] = [
     RULES_OF_HEADER,
     RULES_OF_TABLE,
     OF_TREES,
@@ -17,6 +17,7 @@ pub const RULES: [&[Rule]; 11] = [
     OF_LIGHTS,
     OF_TEXTURES,
     OF_MEANS,
+    OF_LINKS,
 ];
 
 rules! {
@@ -95,4 +96,11 @@ rules! {
     records::MEANS, OF_MEANS:
     MEAN_IS_LIGHT = "the mean is finite, not negative and not black";
     TRIANGLES_ASCEND = "the triangles of one row of TXTR ascend";
+}
+
+rules! {
+    records::LINKS, OF_LINKS:
+    LIGHTS_HAVE_LINKS = "each row of LGHT has one";
+    LINKS_ARE_NUMBERED = "it is 0, or that of a light before it, or the next one after those";
+    SOME_LIGHT_IS_LINKED = "one of them is not 0";
 }

@@ -40,7 +40,7 @@ pub use anchor::Anchor;
 pub use meeting::{Hit, HitSurface};
 pub use prim::Sender;
 pub use sight::{Seen, SeenLight};
-pub use tracer::Tracer;
+pub use tracer::{Caster, Tracer};
 
 use crate::scene::{Instance, Mesh, Pose, Scene};
 use blas::{Blas, TriangleId};

@@ -26,6 +26,15 @@ pub struct Tracer<'a> {
     lights: Vec<Prim>,
 }
 
+/// A prim that may cast a shadow.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Caster {
+    /// A row of [`Scene::instances`].
+    Instance(u32),
+    /// A row of [`Scene::lights`]: a sphere.
+    Sphere(u32),
+}
+
 #[derive(Debug)]
 enum Item<'a> {
     Sphere(Sphere),
@@ -117,8 +126,20 @@ impl<'a> Tracer<'a> {
         tmax: f32,
         accept: &impl Fn(u32, u32, Vec2) -> bool,
     ) -> bool {
+        self.occluded_by(origin, direction, tmax, accept, &|_| true)
+    }
+
+    /// The same, of the prims alone that `casts` names.
+    pub fn occluded_by(
+        &self,
+        origin: Vec3,
+        direction: Vec3,
+        tmax: f32,
+        accept: &impl Fn(u32, u32, Vec2) -> bool,
+        casts: &impl Fn(Caster) -> bool,
+    ) -> bool {
         match usable(origin.as_dvec3(), direction.as_dvec3()) {
-            Some(ray) => self.blocks(&ray, f64::from(tmax), accept),
+            Some(ray) => self.blocks(&ray, f64::from(tmax), accept, casts),
             None => true,
         }
     }
@@ -132,20 +153,41 @@ impl<'a> Tracer<'a> {
         to: &Anchor,
         accept: &impl Fn(u32, u32, Vec2) -> bool,
     ) -> bool {
+        self.occluded_between_by(from, to, accept, &|_| true)
+    }
+
+    /// The same, of the prims alone that `casts` names.
+    pub fn occluded_between_by(
+        &self,
+        from: &Anchor,
+        to: &Anchor,
+        accept: &impl Fn(u32, u32, Vec2) -> bool,
+        casts: &impl Fn(Caster) -> bool,
+    ) -> bool {
         let direction = to.position - from.position;
         let start = from.origin_toward(direction).as_dvec3();
         let end = to.origin_toward(-direction).as_dvec3();
         match usable(start, end - start) {
-            Some(ray) => self.blocks(&ray, 1.0, accept),
+            Some(ray) => self.blocks(&ray, 1.0, accept, casts),
             None => true,
         }
     }
 
-    fn blocks(&self, ray: &Ray, tmax: f64, accept: &impl Fn(u32, u32, Vec2) -> bool) -> bool {
+    fn blocks(
+        &self,
+        ray: &Ray,
+        tmax: f64,
+        accept: &impl Fn(u32, u32, Vec2) -> bool,
+        casts: &impl Fn(Caster) -> bool,
+    ) -> bool {
         let mut blocked = false;
         self.visit::<false>(ray, tmax, |meeting| {
             let prim = self.prim(meeting);
-            blocked = prim.casts_shadow() && counts(meeting, prim, ray, accept);
+            let caster = match &meeting.on {
+                On::Triangle { id, .. } => Caster::Instance(id.instance),
+                On::Sphere(sphere) => Caster::Sphere(sphere.light),
+            };
+            blocked = prim.casts_shadow() && casts(caster) && counts(meeting, prim, ray, accept);
             if blocked { -1.0 } else { tmax }
         });
         blocked

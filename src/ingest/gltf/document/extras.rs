@@ -49,6 +49,10 @@ pub(in crate::ingest::gltf) struct UsdLux {
     #[serde(default)]
     pub visibility: UsdVisibility,
     pub group: Option<String>,
+    #[serde(rename = "lightLink")]
+    pub light_link: Option<u64>,
+    #[serde(rename = "shadowLink")]
+    pub shadow_link: Option<u64>,
     pub values: Option<UsdValues>,
 }
 
@@ -78,6 +82,13 @@ pub(in crate::ingest::gltf) struct UsdShaping {
     pub focus: Real,
     #[serde(default)]
     pub focus_tint: [Real; 3],
+}
+
+/// `extras.usdLinks`: the link sets that geometry is in, or those that it is not in.
+#[derive(Deserialize)]
+pub(in crate::ingest::gltf) struct UsdLinks {
+    pub inside: Option<Vec<u64>>,
+    pub outside: Option<Vec<u64>>,
 }
 
 /// `extras.usdFog`: the homogeneous fog in a node's box, or everywhere.
@@ -120,6 +131,15 @@ impl UsdLux {
         object: &str,
     ) -> Result<Option<UsdLux>, Fault> {
         member(extras, "usdLux", object)
+    }
+}
+
+impl UsdLinks {
+    pub(in crate::ingest::gltf) fn of(
+        extras: &Extras,
+        object: &str,
+    ) -> Result<Option<UsdLinks>, Fault> {
+        member(extras, "usdLinks", object)
     }
 }
 

@@ -1,0 +1,233 @@
+"""Light linking and shadow linking: which geometry a light lights, and which casts shadows from it.
+
+UsdLux has a collection for each, `lightLink` and `shadowLink`; usd-core computes what they hold. A *link set* is what
+a collection holds of the geometry that is exported. Equal sets are one, and a set of everything is none, so a stage
+whose lights light everything exports nothing of this. The form in the file is in `src/ingest/carriers.md`.
+
+Prims are asked for by their paths on the stage, those of instances by the paths of their proxies. What a
+PointInstancer places has two paths, the prototype's and the instancer's. A collection that names the prototype or
+something above it, other than the stage's root, is taken at that word. Else it is asked for the instancer.
+
+A GeomSubset of faces may be in a set that its mesh is not in. A mesh is cut into parts by material; where a collection
+names a subset, that is one more part. Parts carry sets of their own if those differ from the mesh's.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+from pxr import Sdf, Usd, UsdGeom, UsdLux
+
+from .light_inputs import SIZES, light_type
+from .mesh import MeshSource, Piece
+from .prim_tree import Prim
+from .report import Notebook
+from .stage import PREDICATE
+
+_LINKS = ("lightLink", "shadowLink")
+
+Place = tuple[str, ...]
+"""The path of a prim, and those of the PointInstancers that place it, the innermost first."""
+
+
+class Linking:
+    """The link sets of a compiled stage."""
+
+    def __init__(self, stage: Usd.Stage, prims: list[Prim], report: Notebook) -> None:
+        self.stage, self.report = stage, report
+        self._queries: list[_Query] = []
+        self._number: dict = {}
+        """Of each query its place among them; -1 for one that holds everything by what it says."""
+        lights: dict[str, list[int]] = {}
+        for prim, _ in _all(prims):
+            if prim.light is not None and prim.light_path not in lights:
+                lights[prim.light_path] = [self._query(prim.light_path, link) for link in _LINKS]
+        self._members: dict[Place, tuple[bool, ...]] = {}
+        self._sets: list[int | None] = []
+        self._lights: dict[str, list[int | None]] = {}
+        self._meshes: dict[tuple[int, tuple], MeshSource] = {}
+        if not self._queries:
+            return
+        for prim, chain in _all(prims):
+            if _is_geometry(prim):
+                for path in (prim.path, *_parts(prim)):
+                    self._member((path, *chain))
+        self._number_sets(lights)
+
+    def node(self, prim: Prim, chain: Place) -> dict:
+        """What the extras of a prim's node get, placed by a chain of PointInstancers."""
+        if not self._lights or not _is_geometry(prim):
+            return {}
+        outside = self._outside((prim.path, *chain))
+        return {"usdLinks": self._said(outside)} if outside else {}
+
+    def light(self, prim: Prim) -> dict:
+        """What the `usdLux` extras of a light get."""
+        numbers = self._lights.get(prim.light_path, ())
+        return {link: number for link, number in zip(_LINKS, numbers, strict=False) if number is not None}
+
+    def mesh(self, prim: Prim, chain: Place) -> MeshSource:
+        """The mesh of a prim, whose parts carry the sets that they are in where those differ from the mesh's."""
+        mesh = prim.mesh
+        if not self._lights or not _parts(prim):
+            return mesh
+        own = self._outside((prim.path, *chain))
+        parts = [_subset(prim, piece) for piece in mesh.pieces]
+        outside = [own if part is None else self._outside((part, *chain)) for part in parts]
+        if all(sets == own for sets in outside):
+            return mesh
+        key = (id(mesh), own, tuple(outside))
+        if key not in self._meshes:
+            pieces = []
+            for piece, sets in zip(mesh.pieces, outside, strict=True):
+                if sets != own:
+                    extras = {**piece.primitive["extras"], "usdLinks": self._said(sets)}
+                    piece = replace(piece, primitive={**piece.primitive, "extras": extras})
+                pieces.append(piece)
+            self._meshes[key] = replace(mesh, pieces=pieces)
+        return self._meshes[key]
+
+    # -- sets ------------------------------------------------------------------------------------
+
+    def _query(self, path: str, link: str) -> int:
+        """The number of the query of a light's collection; -1 if it holds everything by what it says."""
+        query = _collection(self.stage.GetPrimAtPath(path), link).ComputeMembershipQuery()
+        if query not in self._number:
+            new = _Query(query)
+            self._number[query] = -1 if new.is_all else len(self._queries)
+            if not new.is_all:
+                self._queries.append(new)
+            for named in sorted(new.named, key=str):
+                if not named.IsPropertyPath() and not self.stage.GetPrimAtPath(named):
+                    self.report.note(path, f"{link} of nothing", f"its collection names {named}, which is not there")
+        return self._number[query]
+
+    def _member(self, place: Place) -> tuple[bool, ...]:
+        """For each query, whether it holds what stands at a place."""
+        if place not in self._members:
+            paths = tuple(Sdf.Path(path) for path in place)
+            self._members[place] = tuple(query.holds(paths) for query in self._queries)
+        return self._members[place]
+
+    def _number_sets(self, lights: dict[str, list[int]]) -> None:
+        """Number the sets in the order of the lights that name them."""
+        columns = list(zip(*self._members.values(), strict=True))
+        numbers: dict[tuple, int] = {}
+        self._sets = [None] * len(self._queries)
+        for of_light in lights.values():
+            for query in of_light:
+                if query >= 0 and columns and not all(columns[query]):
+                    self._sets[query] = numbers.setdefault(columns[query], len(numbers))
+        self._count = len(numbers)
+        named = {path: [self._sets[q] if q >= 0 else None for q in of_light] for path, of_light in lights.items()}
+        self._lights = {path: sets for path, sets in named.items() if sets != [None, None]}
+
+    def _outside(self, place: Place) -> tuple[int, ...]:
+        """The numbers of the sets that do not hold what stands at a place, ascending."""
+        held = self._member(place)
+        numbers = {number for number, holds in zip(self._sets, held, strict=True) if number is not None and not holds}
+        return tuple(sorted(numbers))
+
+    def _said(self, outside: tuple[int, ...]) -> dict:
+        """`usdLinks`, by the shorter list."""
+        if 2 * len(outside) <= self._count:
+            return {"outside": list(outside)}
+        return {"inside": [number for number in range(self._count) if number not in set(outside)]}
+
+
+def _all(prims: list[Prim]) -> Iterator[tuple[Prim, Place]]:
+    """All prims, prototypes once for each chain of PointInstancers that places them."""
+    seen: set[tuple[int, Place]] = set()
+    open_: list[tuple[Prim, Place]] = [(prim, ()) for prim in reversed(prims)]
+    while open_:
+        prim, chain = open_.pop()
+        yield prim, chain
+        below = [(child, chain) for child in prim.children]
+        for prototype, _ in prim.instances:
+            key = (id(prototype), (prim.path, *chain))
+            if key not in seen:
+                seen.add(key)
+                below.append((prototype, key[1]))
+        open_ += reversed(below)
+
+
+def _is_geometry(prim: Prim) -> bool:
+    """Whether the prim is lit, or casts shadows: a mesh, fog, or a light whose shape does."""
+    light = prim.light
+    casts = light is not None and light.type in SIZES and light.visibility.get("shadows", False)
+    return prim.mesh is not None or prim.fog is not None or casts
+
+
+def _subset(prim: Prim, piece: Piece) -> str | None:
+    """The path of the GeomSubset that a piece of the prim's mesh is, if it is one."""
+    # The piece has the path in the instance that was read first; the name is the same in all.
+    path = piece.primitive.get("extras", {}).get("usdPath")
+    return None if path is None else f"{prim.path}/{path.rsplit('/', 1)[-1]}"
+
+
+def _parts(prim: Prim) -> list[str]:
+    """The GeomSubsets that the prim's mesh is cut into."""
+    pieces = prim.mesh.pieces if prim.mesh is not None else []
+    return [path for path in (_subset(prim, piece) for piece in pieces) if path is not None]
+
+
+def _collection(light: Usd.Prim, link: str) -> Usd.CollectionAPI:
+    api = UsdLux.LightAPI(light)
+    return api.GetLightLinkCollectionAPI() if link == "lightLink" else api.GetShadowLinkCollectionAPI()
+
+
+class _Query:
+    """What a collection holds."""
+
+    def __init__(self, query) -> None:
+        self.query = query
+        self.by_rules = query.UsesPathExpansionRuleMap()
+        rules = dict(query.GetAsPathExpansionRuleMap()) if self.by_rules else {}
+        self.is_all = rules == {Sdf.Path.absoluteRootPath: Usd.Tokens.expandPrims}
+        self.named = frozenset(rules)
+        """The paths that it names; none if it is an expression."""
+
+    def holds(self, place: tuple[Sdf.Path, ...]) -> bool:
+        """Whether it holds what stands at a place."""
+        path, *chain = place
+        if not chain:
+            return self.query.IsPathIncluded(path)
+        if not self.by_rules:
+            return any(self.query.IsPathIncluded(at) for at in place)
+        for at in (path, *chain[:-1]):
+            if any(prefix in self.named for prefix in at.GetPrefixes()):
+                return self.query.IsPathIncluded(at)
+        return self.query.IsPathIncluded(chain[-1])
+
+
+class LinkSubsets:
+    """The GeomSubsets that a mesh is cut by because collections name them."""
+
+    def __init__(self, stage: Usd.Stage, report: Notebook) -> None:
+        self.report = report
+        self._named: set[Sdf.Path] = set()
+        for prim in Usd.PrimRange(stage.GetPseudoRoot(), PREDICATE):
+            if light_type(prim) is None:
+                continue
+            for link in _LINKS:
+                query = _Query(_collection(prim, link).ComputeMembershipQuery())
+                named = ((path, stage.GetPrimAtPath(path)) for path in query.named if path.IsPrimPath())
+                self._named.update(path for path, prim in named if prim and prim.IsA(UsdGeom.Subset))
+
+    def of(self, mesh: Usd.Prim, others: list[Usd.Prim]) -> list[Usd.Prim]:
+        """Those of a mesh, beside others that it is cut by. Faces that are in two stay in the first."""
+        if not self._named or not mesh.IsA(UsdGeom.Imageable):
+            return []
+        own = [s for s in UsdGeom.Subset.GetAllGeomSubsets(UsdGeom.Imageable(mesh)) if s.GetPath() in self._named]
+        found: list[Usd.Prim] = []
+        for subset in own:
+            before = [*others, *found]
+            if subset.GetPrim() in before or subset.GetElementTypeAttr().Get() != UsdGeom.Tokens.face:
+                continue
+            faces = set(subset.GetIndicesAttr().Get() or ())
+            if any(faces & set(UsdGeom.Subset(other).GetIndicesAttr().Get() or ()) for other in before):
+                why = "it shares faces with another subset, whose links these faces have"
+                self.report.warn(subset.GetPath(), "linked faces that are in two subsets", why)
+            found.append(subset.GetPrim())
+        return found
