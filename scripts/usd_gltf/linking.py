@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import partial
 
 from pxr import Sdf, Usd, UsdGeom, UsdLux
 
@@ -92,16 +93,23 @@ class Linking:
 
     def _query(self, path: str, link: str) -> int:
         """The number of the query of a light's collection; -1 if it holds everything by what it says."""
-        query = _collection(self.stage.GetPrimAtPath(path), link).ComputeMembershipQuery()
-        if query not in self._number:
+        prim = self.stage.GetPrimAtPath(path)
+        if not _is_authored(prim, link):
+            return -1
+        collection = _collection(prim, link)
+        query = collection.ComputeMembershipQuery()
+        # Queries of expressions are equal to one another, whatever the expressions say.
+        is_expression = not query.UsesPathExpansionRuleMap()
+        key = collection.ResolveCompleteMembershipExpression().GetText() if is_expression else query
+        if key not in self._number:
             new = _Query(query)
-            self._number[query] = -1 if new.is_all else len(self._queries)
+            self._number[key] = -1 if new.is_all else len(self._queries)
             if not new.is_all:
                 self._queries.append(new)
             for named in sorted(new.named, key=str):
                 if not named.IsPropertyPath() and not self.stage.GetPrimAtPath(named):
                     self.report.note(path, f"{link} of nothing", f"its collection names {named}, which is not there")
-        return self._number[query]
+        return self._number[key]
 
     def _member(self, place: Place) -> tuple[bool, ...]:
         """For each query, whether it holds what stands at a place."""
@@ -172,6 +180,11 @@ def _parts(prim: Prim) -> list[str]:
     return [path for path in (_subset(prim, piece) for piece in pieces) if path is not None]
 
 
+def _is_authored(light: Usd.Prim, link: str) -> bool:
+    """Whether a light says anything of a link; without, it is of everything."""
+    return bool(light.GetAuthoredPropertiesInNamespace(f"collection:{link}"))
+
+
 def _collection(light: Usd.Prim, link: str) -> Usd.CollectionAPI:
     api = UsdLux.LightAPI(light)
     return api.GetLightLinkCollectionAPI() if link == "lightLink" else api.GetShadowLinkCollectionAPI()
@@ -210,7 +223,7 @@ class LinkSubsets:
         for prim in Usd.PrimRange(stage.GetPseudoRoot(), PREDICATE):
             if light_type(prim) is None:
                 continue
-            for link in _LINKS:
+            for link in filter(partial(_is_authored, prim), _LINKS):
                 query = _Query(_collection(prim, link).ComputeMembershipQuery())
                 named = ((path, stage.GetPrimAtPath(path)) for path in query.named if path.IsPrimPath())
                 self._named.update(path for path, prim in named if prim and prim.IsA(UsdGeom.Subset))

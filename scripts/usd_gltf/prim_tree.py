@@ -223,11 +223,12 @@ class PrimTree:
 
 
 def _insert(compiled: Prim, matrix: np.ndarray) -> None:
-    """Put a matrix, or one for each frame, between a prim and its own content, but not its children."""
+    """Put a matrix, or one for each frame, between a prim and its own content, but not its children. They collapse
+    with a matrix that is singular, as of a joint of scale 0."""
     compiled.local = compiled.local @ matrix
     for child in compiled.children:
         if not child.resets:
-            child.local = np.linalg.inv(matrix) @ child.local
+            child.local = np.linalg.pinv(matrix) @ child.local
 
 
 def _holds_light(prim: Usd.Prim) -> bool:

@@ -73,7 +73,7 @@ class Skinning:
             for binding in cache.ComputeSkelBindings(root, PROTOTYPE_PREDICATE):
                 skeleton = cache.GetSkelQuery(binding.GetSkeleton())
                 if skeleton:
-                    transforms = functools.cache(skeleton.ComputeSkinningTransforms)
+                    transforms = functools.lru_cache(maxsize=32)(skeleton.ComputeSkinningTransforms)
                     for skin in binding.GetSkinningTargets():
                         self._bindings[str(skin.GetPrim().GetPath())] = Binding(skeleton, skin, transforms)
 
@@ -220,5 +220,8 @@ def _turn(
 
 
 def _cotransform(matrix: np.ndarray) -> np.ndarray:
-    """(3, 3): how normals, as row vectors, go under a matrix of points."""
-    return np.linalg.inv(matrix[:3, :3]).T
+    """(3, 3): how normals, as row vectors, go under a matrix of points; zero if that is singular, as of a joint of scale 0."""
+    try:
+        return np.linalg.inv(matrix[:3, :3]).T
+    except np.linalg.LinAlgError:
+        return np.zeros((3, 3))

@@ -182,7 +182,7 @@ class Subdivider:
         """The surface of a cage, or that of an equal one among the last: props are often repeated without instancing."""
         digest = hashlib.blake2b(repr(rules).encode())
         topology = cage.topology
-        for part in (cage.points, cage.kept, topology.counts, topology.corners, topology.edge_sharpness,
+        for part in (cage.points, cage.faces, cage.kept, topology.counts, topology.corners, topology.edge_sharpness,
                      topology.vertex_sharpness, topology.creased):  # fmt: skip
             digest.update(np.ascontiguousarray(part).tobytes() + b"|")
         key = digest.digest()

@@ -107,7 +107,7 @@ impl Glossy {
         let sin_h = (sx * sx + sy * sy + sz * sz).sqrt() * inverse;
 
         // GGX (Walter et al. 2007, equation 33) at the least angle off the normal; Smith's shadowing
-        // (Heitz 2014, equation 99) at the best cosine.
+        // (Heitz 2014, equation 99) at the cosine that is expected.
         let sine = (sin_h * cos_w - cos_h * sin_w).max(0.0);
         let alpha2 = alpha * alpha;
         let shape = sine * sine + (1.0 - sine * sine) * alpha2;

@@ -5,7 +5,7 @@
 //! underestimate). Three departures from the paper:
 //!
 //! - The paper's cosines are the largest that any emitter of the cluster can have. They decide what is
-//!   dark. What is not is weighed by the cosines that are [expected](expected) of emitters spread over the
+//!   dark, and weigh what lights a stretch of a ray. What is not is weighed by the cosines that are [expected](expected) of emitters spread over the
 //!   box and of normals spread over the cone: most of a wide cone faces away, whatever its edge does.
 //! - The distance is `d^2 + r^2/10` with `r` the sphere's radius: no kink and no pole where the
 //!   receiver is inside, and in units of length squared, so that the scale of the scene cancels.
@@ -28,7 +28,7 @@ const HORIZON_SLACK: f32 = 1e-5;
 /// A direction is called dark only this far beyond the cone's edge, radians. Just outside the sphere the
 /// cosine of `theta_u` is off by up to 3.5e-4, and the angle with it.
 const EDGE_SLACK: f32 = 1e-3;
-/// The least value of a cosine factor that is not provably zero.
+/// The least value of a largest cosine that is not provably zero.
 const FLOOR: f32 = 1e-4;
 /// The least share of the largest cosine that is expected: emitters are not spread evenly.
 const LEAST_EXPECTED: f32 = 0.02;

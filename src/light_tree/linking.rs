@@ -27,8 +27,13 @@ use std::collections::HashMap;
 use std::ops::Range;
 use std::sync::{Arc, PoisonError};
 
-/// More shares than this, of classes times groups, are not kept: 64 MB. Then a lane counts as a whole or not at all.
+/// More shares of groups than this are not kept in a tree: 64 MB. For the classes that are left, a lane counts as a
+/// whole or not at all.
 const MOST_SHARES: usize = 1 << 21;
+/// More numbers than this are not kept in sets of several. Further sets count as if they held number 0.
+const MOST_MEMBERS: usize = 1 << 22;
+/// More bits than this, of classes times sets, are not kept: 32 MB. Then every set of several counts as lit.
+const MOST_BITS: usize = 1 << 28;
 
 /// A class of receivers, by number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -174,7 +179,7 @@ impl<D: AsRef<[u8]>> LightTree<D> {
         Ok(tree)
     }
 
-    /// What is known of the tree of what stands still. What one lot of receivers needs is kept until another asks.
+    /// What is known of the tree of what stands still. The last result is kept.
     fn still_lanes(&self, tree: &TreeRow, lit_by: &Arc<LitBy>) -> Arc<LitLanes> {
         let known = &self.known().lit_lanes;
         let mut known = known.lock().unwrap_or_else(PoisonError::into_inner);
@@ -199,21 +204,20 @@ impl<D: AsRef<[u8]>> LightTree<D> {
         let (groups, classes) = (self.groups_of(tree), lit_by.classes());
         let lit = sets.lit(lit_by);
         let (mut shares, mut whole) = (Vec::new(), vec![1.0; classes]);
-        if classes.saturating_mul(groups.len()) <= MOST_SHARES {
-            shares.reserve(classes * groups.len());
-            for (class, whole) in (0..).zip(&mut whole) {
-                let below = still.map_or(1.0, |still| still.whole[class as usize]);
-                let start = shares.len();
-                shares.resize(start + groups.len(), [1.0; WIDTH]);
-                let is_lit = |set| lit.get(class, set);
-                *whole = self.find_shares(groups, &sets, is_lit, below, &mut shares[start..]);
-            }
+        let kept = classes.min(MOST_SHARES / groups.len().max(1));
+        shares.reserve(kept * groups.len());
+        for (class, whole) in (0..).zip(&mut whole[..kept]) {
+            let below = still.map_or(1.0, |still| still.whole[class as usize]);
+            let start = shares.len();
+            shares.resize(start + groups.len(), [1.0; WIDTH]);
+            let is_lit = |set| lit.get(class, set);
+            *whole = self.find_shares(groups, &sets, is_lit, below, &mut shares[start..]);
         }
         LitLanes { sets, lit, shares, whole }
     }
 
     /// Fills in the shares of the energies of lanes that light a class, and returns that of all. `below` is the share
-    /// of the tree of what stands still. A share is 1 only if it is the whole, and 0 only if it is nothing.
+    /// of the tree of what stands still. A share is 0 only if it is nothing.
     fn find_shares(
         &self,
         groups: &[Group],
@@ -261,7 +265,7 @@ impl<D: AsRef<[u8]>> LightTree<D> {
     fn find_lane_sets(&self, tree: &TreeRow, still: Option<&LaneSets>) -> LaneSets {
         let groups = self.groups_of(tree);
         let numbers = self.link_numbers();
-        let mut sets = Unions { numbers, several: Vec::new(), known: HashMap::new() };
+        let mut sets = Unions { numbers, several: Vec::new(), known: HashMap::new(), members: 0 };
         let mut of_lanes: Vec<[u32; WIDTH]> = vec![[0; WIDTH]; groups.len()];
         let mut of_groups = vec![0; groups.len()];
         // What a group leads to stands behind it.
@@ -303,6 +307,8 @@ struct Unions {
     numbers: u32,
     several: Vec<Box<[u32]>>,
     known: HashMap<Box<[u32]>, u32>,
+    /// Numbers in all of them.
+    members: usize,
 }
 
 impl Unions {
@@ -324,9 +330,13 @@ impl Unions {
         }
         all.sort_unstable();
         all.dedup();
+        if self.members + all.len() > MOST_MEMBERS {
+            return self.known.get(all.as_slice()).copied().unwrap_or(0);
+        }
         let next = self.numbers + self.several.len() as u32;
-        let several = &mut self.several;
+        let (several, members) = (&mut self.several, &mut self.members);
         *self.known.entry(all.into()).or_insert_with_key(|all| {
+            *members += all.len();
             several.push(all.clone());
             next
         })
@@ -344,11 +354,14 @@ impl LaneSets {
 
     /// For each class, by set, whether any of it lights the class.
     fn lit(&self, lit_by: &LitBy) -> BitRows {
-        let mut rows = BitRows::new(self.numbers as usize + self.several.len());
+        let sets = self.numbers as usize + self.several.len();
+        let is_small = sets.saturating_mul(lit_by.classes()) <= MOST_BITS;
+        let several = if is_small { self.several.as_slice() } else { &[] };
+        let mut rows = BitRows::new(self.numbers as usize + several.len());
         for class in (0..lit_by.classes() as u32).map(ReceiverClass) {
             let of_one = (0..self.numbers).map(|number| lit_by.holds(class, number));
             let any = |set: &[u32]| set.iter().any(|&number| lit_by.holds(class, number));
-            rows.push(of_one.chain(self.several.iter().map(|set| any(set))));
+            rows.push(of_one.chain(several.iter().map(|set| any(set))));
         }
         rows
     }
@@ -370,7 +383,7 @@ pub(super) struct LitLanes {
     sets: Arc<LaneSets>,
     /// By class and set, whether any of it does.
     lit: BitRows,
-    /// By class and group, of each lane the share of its energy that does; empty if these would be too many.
+    /// By class and group, of each lane the share of its energy that does; of as many classes as there is room for.
     shares: Vec<[f32; WIDTH]>,
     /// By class, that share of the whole tree.
     whole: Vec<f32>,

@@ -271,7 +271,7 @@ impl<'a> LightTreeWriter<'a> {
             file.section(records::TEXTURES, false, &self.textures);
             file.section(records::MEANS, false, &self.means);
         }
-        // Nor these, for whoever has all lights light everything.
+        // A file whose lights light everything has no links.
         if !lights.links.is_empty() {
             file.section(records::LINKS, false, &lights.links);
             return file.finish(fingerprint);

@@ -135,6 +135,15 @@ def test_expressions_are_evaluated(gltf):
     assert [lit(scene, "/L", f"/Geo/{c}") for c in "abc"] == [True, True, False]
 
 
+def test_two_expressions_are_two_sets(gltf):
+    body = 'uniform bool collection:lightLink:includeRoot = 0\npathExpression collection:lightLink:membershipExpression = "/Geo/{}"'
+    scene = gltf(CUBES + "".join(light(name, body.format(name)) for name in "ab"))
+    assert [[lit(scene, f"/{name}", f"/Geo/{c}") for c in "abc"] for name in "ab"] == [
+        [True, False, False],
+        [False, True, False],
+    ]
+
+
 def test_instances_are_told_apart(gltf):
     scene = gltf(
         """def Xform "Proto" (active = false) {}

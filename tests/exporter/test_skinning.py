@@ -33,22 +33,22 @@ NODDING = "rotations.timeSamples = { 1: [(1, 0, 0, 0), (0.9239, 0, 0.3827, 0)], 
 HELD = "rotations = [(1, 0, 0, 0), (0.8, 0, 0, 0.6)]"
 
 
-def animation(rotations=NODDING, name="Nod", more=""):
+def animation(rotations=NODDING, name="Nod", more="", scales="[(1, 1, 1), (1, 1.5, 1)]"):
     return f"""def SkelAnimation "{name}" {{
         uniform token[] joints = ["Root", "Root/Tip"]
         float3[] translations = [(0, 0.5, 0), (1, 0, 0)]
         quatf[] {rotations}
-        half3[] scales = [(1, 1, 1), (1, 1.5, 1)]
+        half3[] scales = {scales}
         {more}
     }}"""
 
 
-def figure(meshes, rotations=NODDING, more="", root='"Figure"'):
+def figure(meshes, rotations=NODDING, more="", root='"Figure"', **how):
     return f"""def SkelRoot {root} (prepend apiSchemas = ["SkelBindingAPI"]) {{
         rel skel:skeleton = </Figure/Bones>
         rel skel:animationSource = </Figure/Nod>
         {SKELETON}
-        {animation(rotations, more=more)}
+        {animation(rotations, more=more, **how)}
         {meshes}
     }}"""
 
@@ -167,6 +167,18 @@ def test_normals_turn_as_usdskel_turns_them(export, normals, method):
         assert np.linalg.norm(found - normal, axis=1).min() < 2e-5
     for normal in found:
         assert np.linalg.norm(wanted - normal, axis=1).min() < 2e-5
+
+
+def test_a_joint_of_no_size_hides_what_it_moves_and_nothing_else(export):
+    """Riggers hide things so. It has no inverse, which normals and children of what it moves would need."""
+    normals = 'normal3f[] normals = [(0, 0, 1), (0, 0, 1), (0, 0, 1), (0, 0, 1), (0, 0, 1), (0, 0, 1)] (interpolation = "vertex")'
+    rigid = mesh(RIGID + 'def Cube "Below" { double size = 1 }', name="Rigid")
+    text = figure(mesh(SKIN + normals) + "\n" + rigid, scales="[(1, 1, 1), (0, 0, 0)]")
+    result = export(text, "--frames", "1")
+    assert result.code == 0, result.err
+    wanted, _ = baked(text, "/Figure/M", 1)
+    found = {tuple(sorted(map(tuple, corners.round(4) + 0.0))) for corners in exported(result)}
+    assert found and found <= triangles(wanted)
 
 
 def test_a_subdivision_surface_is_refined_as_it_is_posed(export):

@@ -283,8 +283,10 @@ fn moving_and_forced_lights_are_linked() {
         render(&set, way.settings(mis, &settings), FRAME)
     };
     let oracle = picture(&stage.scene, Way::of(LightStrategy::Uniform), false, 0);
-    let tree = picture(&stage.scene, Way::of(LightStrategy::Tree), true, 10);
-    assert_eq!(disagreement(&oracle, &tree), None);
+    for (seed, strategy) in [(10, LightStrategy::Tree), (40, LightStrategy::Exhaustive)] {
+        let linked = picture(&stage.scene, Way::of(strategy), true, seed);
+        assert_eq!(disagreement(&oracle, &linked), None, "{strategy:?}");
+    }
     let paths: Vec<String> = (0..stage.scene.lights.len())
         .step_by(2)
         .map(|row| stage.scene.light_path(row).to_owned())

@@ -301,7 +301,7 @@ fn a_frame_that_is_gone_on_with_is_the_one_that_was_never_stopped() {
     let set = stage.set();
     let aovs = vec![Aov::Beauty, Aov::Cryptomatte, Aov::Motion, Aov::Direct, Aov::Variance];
     let studio = Studio { set: &set, settings: RenderSettings { aovs, ..settings() } };
-    let goal = goal(0.1, &studio.reference(256));
+    let goal = goal(0.05, &studio.reference(256));
     let (film, whole, _) = studio.to_error(5, goal);
     for patience in [1, 7, 40] {
         let delegate = studio.delegate(5);

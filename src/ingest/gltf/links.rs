@@ -10,7 +10,7 @@ use std::collections::HashMap;
 /// More sets than this are refused.
 const MOST_SETS: u32 = 1 << 14;
 
-/// More pairs of a set and a membership than this are refused: what knows who is lit has a bit for each.
+/// More pairs of a set and a membership than this are refused: the renderer keeps each pair.
 const MOST_PAIRS: u64 = 1 << 28;
 
 const REMEDY: &str = "link lights that belong together by one collection";

@@ -4,6 +4,8 @@
 //! be picked. So the integrator cannot tell strategies apart, and a picture has the same mean under each.
 //! Forced lights bypass the strategy: each is always sampled.
 
+mod compared;
+
 use super::knob::Knobs;
 use super::links::FrameLinks;
 use super::settings::{LightStrategy, RenderSettings};
@@ -14,6 +16,7 @@ use crate::light_tree::{
 };
 use crate::math::built_in;
 use crate::math::random::{hash, widen};
+use compared::running_power;
 use glam::Vec3;
 
 /// A light, picked.
@@ -92,7 +95,7 @@ macro_rules! with_viewer {
         let scratch: &mut TreeScratch = $scratch;
         let by_distance = $picker.strategy == LightStrategy::Distance;
         let Wanted { site, cell, class } = *$wanted;
-        // Whom all lights light is asked nothing about links.
+        // A receiver that every light lights skips links.
         macro_rules! with {
             ($one:expr, $of_kind:expr) => {{
                 let (viewer, room) = (Veiled { viewer: $one, cell }, $of_kind);
@@ -314,88 +317,13 @@ impl<'a> LightPicker<'a> {
         }
     }
 
-    /// Number of lights that are not forced.
-    pub fn count(&self) -> u32 {
-        self.tree.unforced_count()
-            + self.infinite.iter().filter(|light| !light.forced).count() as u32
-    }
-
-    /// An unforced light by number: emitters come first, then infinite lights.
-    fn light(&self, at: u32) -> Picked {
-        match at.checked_sub(self.tree.unforced_count()) {
-            None => Picked::Emitter(at),
-            Some(at) => {
-                let mut unforced = (0..).zip(self.infinite).filter(|(_, light)| !light.forced);
-                Picked::Beside(unforced.nth(at as usize).map_or(0, |(row, _)| row))
-            }
-        }
-    }
-
-    /// Picks with probabilities that are the same for every viewer; nothing, if the light does not light it.
-    fn pick_blindly(&self, wanted: &Wanted, u: f64, mut visit: impl FnMut(LightPick)) {
-        let Some(last) = self.count().checked_sub(1) else { return };
-        let at = match self.running_power.last() {
-            Some(total) => self.running_power.partition_point(|&end| end <= u * total) as u32,
-            None => (u * f64::from(self.count())) as u32,
-        };
-        let light = self.light(at.min(last));
-        let probability = self.blind_probability(light);
-        if probability > 0.0 && self.lights(wanted, light) {
-            visit(LightPick { light, probability, expected: probability, weighed: 0 });
-        }
-    }
-
-    /// The probability of a light that is the same for every viewer: by power or uniform.
-    pub fn blind_probability(&self, light: Picked) -> f64 {
-        match self.running_power.is_empty() {
-            true => 1.0 / f64::from(self.count()),
-            false => self.share_of_power(light),
-        }
-    }
-
-    fn share_of_power(&self, light: Picked) -> f64 {
-        let index = match light {
-            Picked::Emitter(emitter) => emitter as usize,
-            Picked::Beside(row) => {
-                let unforced = self.infinite[..row as usize].iter().filter(|light| !light.forced);
-                self.tree.unforced_count() as usize + unforced.count()
-            }
-        };
-        let before = if index == 0 { 0.0 } else { self.running_power[index - 1] };
-        let total = self.running_power.last().copied().unwrap_or(0.0);
-        if total > 0.0 { (self.running_power[index] - before) / total } else { 0.0 }
-    }
-
-    fn pick_exhaustively(&self, wanted: &Wanted, u: f64, mut visit: impl FnMut(LightPick)) {
-        let mut total = 0.0;
-        self.for_each_importance(wanted, |_, importance| total += importance);
-        let (mut left, mut picked) = (u * total, None);
-        self.for_each_importance(wanted, |light, importance| {
-            if importance > 0.0 && left >= 0.0 {
-                picked = Some((light, importance));
-                left -= importance;
-            }
-        });
-        if let Some((light, importance)) = picked {
-            let probability = importance / total;
-            visit(LightPick { light, probability, expected: probability, weighed: 0 });
-        }
-    }
-
-    fn exhaustive_probability(&self, wanted: &Wanted, light: Picked) -> f64 {
-        let (mut total, mut found) = (0.0, 0.0);
-        self.for_each_importance(wanted, |other, importance| {
-            total += importance;
-            found = if other == light { importance } else { found };
-        });
-        if found > 0.0 { found / total } else { 0.0 }
-    }
-
     /// Calls `visit` with the importance of every light that is not forced.
     pub fn for_each_importance(&self, wanted: &Wanted, mut visit: impl FnMut(Picked, f64)) {
         with_viewer!(self, wanted, &mut TreeScratch::default(), |viewer, _room| {
             self.tree.for_each_leaf(viewer, |emitter, importance, _| {
-                visit(Picked::Emitter(emitter), importance);
+                let light = Picked::Emitter(emitter);
+                // Below the leaf of a placed tree nothing is masked.
+                visit(light, if self.lights(wanted, light) { importance } else { 0.0 });
             })
         });
         for (row, light) in (0..).zip(self.infinite).filter(|(_, light)| !light.forced) {
@@ -435,22 +363,4 @@ fn importance_of(light: &InfiniteLight, site: &Site) -> f64 {
         },
         Site::Along(_, length) => light.importance(Vec3::ZERO) * f64::from(*length),
     }
-}
-
-/// Energies in the emitters' order, then those of the lights at infinity, summed up. A light at
-/// infinity counts as the point light that gives its irradiance at the tree's radius.
-fn running_power(tree: &FrameTree, infinite: &[InfiniteLight]) -> Vec<f64> {
-    let mut power = vec![0.0; tree.unforced_count() as usize];
-    let anywhere = Receiver { point: Vec3::ZERO, normal: Vec3::ZERO };
-    tree.for_each_leaf(&anywhere, |emitter, _, energy| power[emitter as usize] = energy);
-    let radius2 = tree.root().map_or(1.0, |root| f64::from(root.half_extent().length_squared()));
-    let radius2 = if radius2 > 0.0 { radius2 } else { 1.0 };
-    let unforced = infinite.iter().filter(|light| !light.forced);
-    power.extend(unforced.map(|light| light.importance(Vec3::ZERO) * radius2));
-    let mut sum = 0.0;
-    for entry in &mut power {
-        sum += *entry;
-        *entry = sum;
-    }
-    power
 }
