@@ -15,7 +15,7 @@ impl Numbers {
     }
 
     /// Evenly over the logarithm.
-    fn from_to(&mut self, least: f64, most: f64) -> f64 {
+    fn spread_between(&mut self, least: f64, most: f64) -> f64 {
         least * (most / least).powf(self.next())
     }
 
@@ -33,8 +33,8 @@ impl Numbers {
 /// sphere: what the importance says, and what reaches the receiver on average.
 fn told_and_sent(numbers: &mut Numbers) -> (f64, f64) {
     const FACES: usize = 4000;
-    let half = DVec3::from_array([(); 3].map(|()| numbers.from_to(1e-3, 1.0)));
-    let distance = half.length() * numbers.from_to(1.05, 30.0);
+    let half = DVec3::from_array([(); 3].map(|()| numbers.spread_between(1e-3, 1.0)));
+    let distance = half.length() * numbers.spread_between(1.05, 30.0);
     let axis = numbers.within(DVec3::Z, std::f64::consts::PI);
     let theta_o = 3.1 * numbers.next();
     let to = numbers.within(DVec3::Z, std::f64::consts::PI);
