@@ -44,11 +44,11 @@ class Binding:
         return self.skin.HasJointInfluences() and self.skin.IsRigidlyDeformed() and not self.skin.HasBlendShapes()
 
     def to_mesh(self, code: float) -> np.ndarray:
-        """(4, 4): from the skeleton's space to the mesh's, for row vectors."""
+        """(4, 4): from the skeleton's space to the mesh's, for row vectors. Nothing is seen of a mesh whose space is singular."""
         cache = UsdGeom.XformCache(code)
         skeleton, mesh = _as_placed(self.skeleton.GetPrim(), self.skin.GetPrim()), self.skin.GetPrim()
         to_world, from_world = (np.array(cache.GetLocalToWorldTransform(prim)) for prim in (skeleton, mesh))
-        return to_world @ np.linalg.inv(from_world)
+        return to_world @ np.linalg.pinv(from_world)
 
     def state(self, code: float) -> list[np.ndarray]:
         """All numbers that decide the pose at a time."""

@@ -25,21 +25,26 @@ pub(super) struct LinkChanges<'a> {
     /// What is known of two sets.
     known: RefCell<HashMap<[Option<u32>; 2], Option<Relinked>>>,
     /// Of trees, which link numbers stand for the same.
-    numbers: RefCell<SameLinks>,
+    numbers: SameLinks,
 }
 
 impl<'a> LinkChanges<'a> {
-    /// Of two scenes, or of versions of which one is a tree.
-    pub fn new(scenes: Option<[&'a SceneSide<'a>; 2]>) -> LinkChanges<'a> {
+    /// Of two scenes, or of versions of which one is a tree. `lights` are the link numbers, before and after, of the
+    /// lights that both have.
+    pub fn new(
+        scenes: Option<[&'a SceneSide<'a>; 2]>,
+        lights: impl Iterator<Item = (u32, u32)>,
+    ) -> LinkChanges<'a> {
         let prims = scenes.map_or_else(BTreeMap::new, common_prims);
-        LinkChanges { scenes, prims, known: RefCell::default(), numbers: RefCell::default() }
+        LinkChanges { scenes, prims, known: RefCell::default(), numbers: SameLinks::of(lights) }
     }
 
     /// What differs in the links of a light.
     pub fn of(&self, before: &Light, after: &Light) -> Vec<Difference> {
         let Some(scenes) = self.scenes else {
-            let agree = self.numbers.borrow_mut().agree(before.link, after.link);
-            return (!agree).then_some(Difference::LightLink { prims: None }).into_iter().collect();
+            let is_same = self.numbers.are_same(before.link, after.link);
+            let difference = (!is_same).then_some(Difference::LightLink { prims: None });
+            return difference.into_iter().collect();
         };
         let [a, b] =
             [(scenes[0], before), (scenes[1], after)].map(|(scene, light)| links_of(scene, light));

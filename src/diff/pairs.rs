@@ -57,7 +57,9 @@ impl<'a> Pairs<'a> {
         [before, after]: [&[Light<'a>]; 2],
     ) -> Pairs<'a> {
         let found = matching(before, after);
-        let changes = LinkChanges::new(scenes);
+        let both = found.same.iter().chain(&found.renamed);
+        let links = both.map(|&(b, a)| (before[b as usize].link, after[a as usize].link));
+        let changes = LinkChanges::new(scenes, links);
         let count = before.len() + found.added.len();
         let mut pairs = Pairs {
             changed: Vec::new(),

@@ -6,7 +6,7 @@
 //!
 //! - The paper's cosines are the largest that any emitter of the cluster can have. They decide what is
 //!   dark, and weigh what lights a stretch of a ray. Otherwise a cluster is weighed by the cosines that
-//!   are [expected] of emitters spread over the box and of normals spread over the cone: most of a wide
+//!   are [expected](clipped_mean) of emitters spread over the box and of normals spread over the cone: most of a wide
 //!   cone faces away, whatever its edge does.
 //! - The distance is `d^2 + r^2/10` with `r` the sphere's radius: no kink and no pole where the
 //!   receiver is inside, and in units of length squared, so that the scale of the scene cancels.
@@ -123,10 +123,10 @@ impl Cluster {
         let across = 0.5 * (1.0 - along);
         let square = along * cosine * cosine + across * (1.0 - cosine * cosine) + offset2;
         let half = (3.0 * (square - mean * mean).max(0.0)).sqrt();
-        let back = if self.two_sided { expected(-mean, half) } else { 0.0 };
+        let back = if self.two_sided { clipped_mean(-mean, half) } else { 0.0 };
         // Of beams narrower than a hemisphere, fewer reach any one point.
         let beam = (2.0 * (1.0 - self.cos_theta_e) / (1.0 - cos_o).max(1e-9)).min(1.0);
-        let share = ((expected(mean, half) + back) * beam).max(LEAST_EXPECTED * emission);
+        let share = ((clipped_mean(mean, half) + back) * beam).max(LEAST_EXPECTED * emission);
         if cos_o > -1.0 { share } else { emission }
     }
 
@@ -193,7 +193,7 @@ impl Sight {
 /// The mean of a cosine that is spread evenly over a mean and `half` to either side, with 0 for all that is
 /// below 0.
 #[inline(always)]
-fn expected(mean: f32, half: f32) -> f32 {
+fn clipped_mean(mean: f32, half: f32) -> f32 {
     let high = (mean + half).max(0.0);
     if mean >= half { mean } else { high * high / (4.0 * half).max(f32::MIN_POSITIVE) }
 }
@@ -245,7 +245,8 @@ pub(super) fn factors(cluster: &Cluster, receiver: &Receiver) -> Factors {
     let cosine_i = (-below * inverse_d).clamp(-1.0, 1.0);
     let sine_i = (1.0 - cosine_i * cosine_i).sqrt();
     let best = if cosine_i >= cos_u { 1.0 } else { cosine_i * cos_u + sine_i * sin_u };
-    let expected = expected(-below * inverse_mean, reach * inverse_mean).max(LEAST_EXPECTED * best);
+    let expected = clipped_mean(-below * inverse_mean, reach * inverse_mean);
+    let expected = expected.max(LEAST_EXPECTED * best);
     let near = sin_u * sin_u * sin_u * sin_u;
     let likely = (expected + near * (best - expected)).max(FLOOR);
     let cosine = if inside | in_medium { 1.0 } else { likely };

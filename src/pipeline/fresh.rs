@@ -298,10 +298,12 @@ fn compare<D: AsRef<[u8]>>(tree: &LightTree<D>, now: &[LightSummary], remedy: St
     let content = |light: &LightSummary| (light.fingerprint, light.class, light.link);
     let after: BTreeMap<&str, _> =
         now.iter().map(|light| (light.path.as_str(), content(light))).collect();
-    let mut links = SameLinks::default();
-    let mut is_dirtied = |path: &str, now: &([u8; 32], u32, u32)| {
+    let links = SameLinks::of(
+        after.iter().filter_map(|(path, now)| before.get(path).map(|then| (then.2, now.2))),
+    );
+    let is_dirtied = |path: &str, now: &([u8; 32], u32, u32)| {
         let Some(then) = before.get(path) else { return false };
-        !links.agree(then.2, now.2) || (then.0, then.1) != (now.0, now.1)
+        !links.are_same(then.2, now.2) || (then.0, then.1) != (now.0, now.1)
     };
     let names = |paths: &mut dyn Iterator<Item = &&str>| paths.map(|p| p.to_string()).collect();
     StaleTree {

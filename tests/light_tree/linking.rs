@@ -7,7 +7,7 @@ use crate::support::{
 use candelabra::bounds::{Aabb, Cone, LightBounds};
 use candelabra::light_tree::{
     FrameTree, LightList, LightLook, LightSummary, LightTree, LightTreeWriter, Link, Linked, LitBy,
-    Moments, Picked, Receiver, ReceiverClass, SameLinks, Scratch, Splitting, TreeKind, Viewer,
+    Moments, Picked, Receiver, ReceiverClass, Scratch, Splitting, TreeKind, Viewer,
 };
 use candelabra::store::StoreError;
 use glam::Vec3;
@@ -386,18 +386,6 @@ fn numbers_out_of_order_are_found_by_verify() {
         assert_eq!(violation.rule.to_string(), rule, "{links:?}");
     }
     linked_tree(&bounds, &[1, 0, 2, 1]).verify().unwrap();
-}
-
-/// A light more shifts the numbers, and none of the others is linked otherwise.
-#[test]
-fn numbers_that_are_shifted_are_the_same() {
-    let agree = |pairs: &[(u32, u32)]| {
-        let mut same = SameLinks::default();
-        pairs.iter().map(|&(before, after)| same.agree(before, after)).collect::<Vec<bool>>()
-    };
-    assert_eq!(agree(&[(0, 0), (1, 2), (2, 3), (1, 2), (0, 0)]), [true; 5]);
-    assert_eq!(agree(&[(1, 2), (1, 3), (2, 2), (3, 3)]), [true, false, false, true]);
-    assert_eq!(agree(&[(0, 1), (1, 0), (1, 1)]), [false, false, true]);
 }
 
 /// Strong lights that light something else draw no samples: one pick is nearly as good as from a tree without them.

@@ -225,7 +225,8 @@ impl Walk<'_> {
             output.notes.add(Category::Lights, placed.object, text);
         }
         let compiled = self.meshes.primitives(self.source, output, mesh)?;
-        let row = &self.source.document.meshes[mesh.value()];
+        let mesh_number = mesh.value();
+        let row = &self.source.document.meshes[mesh_number];
         for (i, &mesh) in compiled.iter().enumerate() {
             let Some(mesh) = mesh else { continue };
             let above = output.scene.nodes[node as usize].path.clone();
@@ -246,8 +247,9 @@ impl Walk<'_> {
                 let text = "its light varies, but its mesh has no material; dark";
                 output.notes.add(Category::Lights, placed.object, text);
             }
-            let (above, extras) = (links.membership, &row.primitives[i].extras);
-            let membership = self.links.membership(output, extras, above, placed.object)?;
+            let primitive = ([mesh_number, i], &row.primitives[i].extras);
+            let above = links.membership;
+            let membership = self.links.of_primitive(output, primitive, above, placed.object)?;
             self.links.add_instance(output, Links { membership, ..links })?;
             let lit = Instance { path, node, mesh, values, shaping, forced, visibility };
             output.scene.instances.push(lit);

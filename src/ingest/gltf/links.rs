@@ -20,6 +20,8 @@ const REMEDY: &str = "link lights that belong together by one collection";
 pub(super) struct LinkTable {
     rows: LinkRows,
     known: HashMap<Membership, u32>,
+    /// Of the primitives of meshes that tell one, by the numbers of both.
+    of_primitives: HashMap<[usize; 2], Option<u32>>,
     /// The objects that say in which sets they are, and the largest number of those.
     told: Vec<(u32, String)>,
     /// One past the largest set that a light names.
@@ -35,13 +37,39 @@ impl LinkTable {
         above: Option<u32>,
         object: &str,
     ) -> Result<Option<u32>, Fault> {
-        let Some(links) = UsdLinks::of(extras, object)? else { return Ok(above) };
+        Ok(self.told(output, extras, object)?.unwrap_or(above))
+    }
+
+    /// The membership of a primitive of a mesh, by their numbers. Every instance asks; extras are read once.
+    pub(super) fn of_primitive(
+        &mut self,
+        output: &mut Output,
+        (primitive, extras): ([usize; 2], &Extras),
+        above: Option<u32>,
+        object: &str,
+    ) -> Result<Option<u32>, Fault> {
+        if let Some(&known) = self.of_primitives.get(&primitive) {
+            return Ok(known);
+        }
+        let Some(told) = self.told(output, extras, object)? else { return Ok(above) };
+        self.of_primitives.insert(primitive, told);
+        Ok(told)
+    }
+
+    /// What an object's extras tell of its membership, if they do.
+    fn told(
+        &mut self,
+        output: &mut Output,
+        extras: &Extras,
+        object: &str,
+    ) -> Result<Option<Option<u32>>, Fault> {
+        let Some(links) = UsdLinks::of(extras, object)? else { return Ok(None) };
         let membership = membership(links, object)?;
         if membership.numbers().is_empty() && matches!(membership, Membership::Outside(_)) {
-            return Ok(None);
+            return Ok(Some(None));
         }
         if let Some(&row) = self.known.get(&membership) {
-            return Ok(Some(row));
+            return Ok(Some(Some(row)));
         }
         let bytes = 2 * size_of_val(membership.numbers()) + size_of::<Membership>() + object.len();
         output.budget.take(bytes as u64, || object.to_string())?;
@@ -51,7 +79,7 @@ impl LinkTable {
         let row = self.rows.memberships.len() as u32;
         self.rows.memberships.push(membership.clone());
         self.known.insert(membership, row);
-        Ok(Some(row))
+        Ok(Some(Some(row)))
     }
 
     /// The sets that the light at a node lights and is shadowed by.

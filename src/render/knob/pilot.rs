@@ -71,8 +71,9 @@ fn pixels_for(settings: &RenderSettings, samples: u32) -> Option<u64> {
 
 fn knobs_for(integrator: &Integrator, error: Option<f64>) -> Knobs {
     let settings = integrator.settings;
+    let mut plain = Plain::default();
     let samples = match error {
-        Some(error) if pilot_pays(settings) => samples_for(integrator, error),
+        Some(error) if pilot_pays(settings) => plain.samples_for(integrator, error),
         _ => settings.samples,
     };
     let Some(pixels) = pixels_for(settings, samples) else { return settings.split.knobs() };
@@ -82,7 +83,7 @@ fn knobs_for(integrator: &Integrator, error: Option<f64>) -> Knobs {
     let handicap = MOST_PIXELS as f64 / pixels as f64;
     let cheap = std::array::from_fn(|kind| tried(kind, 0..FIRST_COSTLY));
     let mut findings = Findings {
-        variance: steady_mean(squared_errors(integrator, PLAIN * pixels as u32)),
+        variance: steady_mean(plain.squared_errors(integrator, PLAIN * pixels as u32)),
         ..traced(integrator, pixels as u32, cheap)
     };
     let best = findings.best(handicap);
@@ -99,6 +100,32 @@ fn knobs_for(integrator: &Integrator, error: Option<f64>) -> Knobs {
     findings.best(handicap)
 }
 
+/// Pixels with the usual knobs, on which none are tried.
+#[derive(Default)]
+struct Plain(Vec<Halves>);
+
+impl Plain {
+    /// The squared errors of so many pixels. Those that are known are not traced again.
+    fn squared_errors(&mut self, integrator: &Integrator, pixels: u32) -> Vec<f64> {
+        let row = |number| pixel(integrator, number, &Default::default()).halves;
+        self.0.par_extend((self.0.len() as u32..pixels).into_par_iter().map(row));
+        let grey = grey(self.0.iter());
+        self.0.iter().map(|halves| halves.squared_error(grey)).collect()
+    }
+
+    /// How many samples a pixel takes in the mean, to an error and at most those of the settings, as far as a few
+    /// pixels can tell. Pixels without noise do not count for the error of a frame.
+    fn samples_for(&mut self, integrator: &Integrator, error: f64) -> u32 {
+        let RenderSettings { width, height, samples: most, .. } = *integrator.settings;
+        let few = u64::from(width) * u64::from(height) / u64::from(2 * PATHS);
+        let few = few.clamp(LEAST_PIXELS, LEAST_PIXELS * u64::from(PLAIN));
+        let errors = self.squared_errors(integrator, few as u32);
+        let noisy: Vec<f64> = errors.into_iter().filter(|&own| own > 0.0).collect();
+        let of_one = f64::from(2 * PATHS) * noisy.iter().sum::<f64>() / noisy.len().max(1) as f64;
+        (of_one / (error * error)).clamp(1.0, f64::from(most)) as u32
+    }
+}
+
 /// What the paths through one pixel showed.
 struct Pixel {
     halves: Halves,
@@ -108,25 +135,6 @@ struct Pixel {
     spent: Each<TraceStats>,
     /// What the paths themselves cost.
     own: TraceStats,
-}
-
-/// How many samples a pixel takes in the mean, to an error and at most those of the settings, with the usual
-/// knobs and as far as a few pixels can tell. Pixels without noise do not count for the error of a frame.
-fn samples_for(integrator: &Integrator, error: f64) -> u32 {
-    let pixels = u64::from(integrator.settings.width) * u64::from(integrator.settings.height);
-    let few = (pixels / u64::from(2 * PATHS)).clamp(LEAST_PIXELS, LEAST_PIXELS * u64::from(PLAIN));
-    let noisy: Vec<f64> =
-        squared_errors(integrator, few as u32).into_iter().filter(|&own| own > 0.0).collect();
-    let of_one = f64::from(2 * PATHS) * noisy.iter().sum::<f64>() / noisy.len().max(1) as f64;
-    (of_one / (error * error)).clamp(1.0, f64::from(integrator.settings.samples)) as u32
-}
-
-/// The squared errors of pixels with the usual knobs.
-fn squared_errors(integrator: &Integrator, pixels: u32) -> Vec<f64> {
-    let row = |number| pixel(integrator, number, &Default::default()).halves;
-    let pixels: Vec<Halves> = (0..pixels).into_par_iter().map(row).collect();
-    let grey = grey(pixels.iter());
-    pixels.iter().map(|halves| halves.squared_error(grey)).collect()
 }
 
 /// The grey floor for some pixels.
