@@ -64,7 +64,7 @@ impl FrameLinks {
 }
 
 impl<D: AsRef<[u8]>> LightTree<D> {
-    /// The tree of a frame, which receivers of some classes pick from: [`Linked`] viewers. Others see all lights.
+    /// The tree of a frame, which receivers of some classes pick from: [`Linked`](super::Linked) viewers. Others see all lights.
     ///
     /// # Errors
     /// [`NoSuchFrame`] if lights change and the file was built without this frame.

@@ -9,7 +9,7 @@
 //! weigh groups by one function (`place`).
 //!
 //! Lane sets and shares follow from the tree, so they cannot be wrong where the numbers are right. They are found
-//! once for an open file, and only if somebody asks for a frame [with links](LightTree::at_frame_linked). A set that
+//! once for an open file, and only if somebody asks for a frame [with links](super::LightTree::at_frame_linked). A set that
 //! holds number 0 is that of number 0, for a lane with such a light is dark to nobody. All lights of a placed tree
 //! are of one number; below the leaf that stands for it, nothing is masked.
 
