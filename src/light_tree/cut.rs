@@ -11,7 +11,7 @@
 
 use super::group::WIDTH;
 use super::leaves::{Route, lane_toward};
-use super::place::{Next, Place, Weighed};
+use super::place::{Place, Step, Way, Weighed};
 use super::sampling::FrameTree;
 use super::splitting::{Rounded, SplitTest, Splitting, allot};
 use super::viewer::Viewer;
@@ -42,14 +42,17 @@ const UNKNOWN: f64 = 0.04;
 /// Buffers for a cut and for walks below it, to be reused.
 #[derive(Debug)]
 pub struct Scratch<V> {
-    pub(super) entries: Vec<Entry<V>>,
+    pub(super) entries: Vec<Entry>,
+    /// The spaces of the entries: in each, the place where the walk came into it. Entries refer to them, because a
+    /// viewer is large, and few clusters are ever looked into.
+    spaces: Vec<Place<V>>,
     /// Of each entry: its importance.
     weights: Vec<f64>,
     /// Of each entry: the most samples that it may get.
     caps: Vec<f64>,
     pub(super) low: Vec<f64>,
     pub(super) high: Vec<f64>,
-    open: Vec<Opened<V>>,
+    open: Vec<Opened>,
     /// Groups weighed since it was made: what picking costs.
     pub weighed: u64,
 }
@@ -57,20 +60,21 @@ pub struct Scratch<V> {
 impl<V> Default for Scratch<V> {
     fn default() -> Self {
         let (weights, caps, low, high) = Default::default();
-        let (entries, open) = Default::default();
-        Scratch { entries, weights, caps, low, high, open, weighed: 0 }
+        let (entries, spaces, open) = Default::default();
+        Scratch { entries, spaces, weights, caps, low, high, open, weighed: 0 }
     }
 }
 
 impl<V> Scratch<V> {
     fn clear(&mut self) {
         self.entries.clear();
+        self.spaces.clear();
         self.weights.clear();
         self.caps.clear();
         self.open.clear();
     }
 
-    fn push(&mut self, entry: Entry<V>, weight: f64, cap: f64) {
+    fn push(&mut self, entry: Entry, weight: f64, cap: f64) {
         self.entries.push(entry);
         self.weights.push(weight);
         self.caps.push(cap);
@@ -79,15 +83,26 @@ impl<V> Scratch<V> {
 
 /// A cluster of the cut, or a light.
 #[derive(Clone, Copy, Debug)]
-pub(super) enum Entry<V> {
+pub(super) enum Entry {
     Light(Picked),
-    Cluster(Place<V>),
+    Cluster(Stop),
+}
+
+/// Where a cluster of the cut is.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Stop {
+    /// The space of its parent.
+    space: u32,
+    /// The [weight](Place::veil) of its lanes of which no more is known.
+    veil: f32,
+    /// From there.
+    way: Way,
 }
 
 /// An opened cluster whose children are still to be looked at.
 #[derive(Clone, Copy, Debug)]
-struct Opened<V> {
-    place: Place<V>,
+struct Opened {
+    stop: Stop,
     /// How many legs of the wanted route lie behind; `None` off the route.
     leg: Option<usize>,
     /// Its importance while it was closed.
@@ -124,23 +139,19 @@ impl FrameTree<'_> {
             scratch.push(Entry::Light(Picked::Beside(row)), importance, 1.0);
         }
         let (mut variance, mut wanted) = (0.0, None);
-        let weight = self.total_importance(viewer);
-        if let Some(place) = self.place_of_root(viewer)
-            && weight > 0.0
-        {
+        if let Some(place) = self.place_of_root(viewer) {
             let leg = route.map(|_| 0);
-            if how.is_off() {
-                wanted = leg.map(|leg| (scratch.entries.len(), leg));
-                // What is hidden or not linked is known of the root's children, not of the root.
-                let is_linked = V::IS_LINKED && self.links.is_some();
-                let is_known = self.veils.is_some() || is_linked;
-                let known = if is_known { self.weigh(&place) } else { None };
-                let known = known.filter(|weighed| weighed.veils.is_some() || is_linked);
-                let weight = known.map_or(weight, |weighed| weighed.importances.iter().sum());
-                scratch.push(Entry::Cluster(place), weight, 1.0);
-            } else {
-                scratch.open.push(Opened { place, leg, weight, opened: 1.0, cap: 1.0 });
+            let stop = Stop { space: 0, veil: place.veil, way: Way::Group(place.at) };
+            scratch.spaces.push(place);
+            if !how.is_off() {
+                scratch.open.push(Opened { stop, leg, weight: 1.0, opened: 1.0, cap: 1.0 });
                 (variance, wanted) = self.open_clusters(beside, how, route, scratch);
+            } else {
+                let weight = if beside.is_empty() { 1.0 } else { self.weight_of_root(&place) };
+                if weight > 0.0 {
+                    wanted = leg.map(|leg| (scratch.entries.len(), leg));
+                    scratch.push(Entry::Cluster(stop), weight, 1.0);
+                }
             }
         }
         let Scratch { weights, caps, low, high, .. } = scratch;
@@ -157,6 +168,27 @@ impl FrameTree<'_> {
         Some(Cut { rounded, wanted })
     }
 
+    /// The importance of everything in the tree, to compare with that of lights beside it.
+    fn weight_of_root<V: Viewer>(&self, place: &Place<V>) -> f64 {
+        // What is hidden or not linked is known of the root's children, not of the root.
+        let is_linked = V::IS_LINKED && self.links.is_some();
+        let is_known = self.veils.is_some() || is_linked;
+        let known = if is_known { self.weigh(place) } else { None };
+        let known = known.filter(|weighed| weighed.veils.is_some() || is_linked);
+        known.map_or_else(
+            || self.total_importance(&place.viewer),
+            |weighed| weighed.importances.iter().sum(),
+        )
+    }
+
+    /// The place of a cluster of the cut; `None` only in an unverified file.
+    #[inline]
+    pub(super) fn place_at<V: Viewer>(&self, stop: Stop, scratch: &Scratch<V>) -> Option<Place<V>> {
+        let from = &scratch.spaces[stop.space as usize];
+        let place = self.go(from, stop.way)?;
+        Some(Place { veil: stop.veil, ..place })
+    }
+
     /// Works off the opened clusters: opens further, or adds entries. Returns the variance that the
     /// entries leave, in the unit of importances, and the entry that leads along the route.
     fn open_clusters<V: Viewer>(
@@ -170,7 +202,13 @@ impl FrameTree<'_> {
         let mut may_open = true;
         // The sum of everything's importance; the root's children know it better than the root.
         let mut total = None;
-        while let Some(Opened { place, leg, weight, opened, cap }) = scratch.open.pop() {
+        while let Some(Opened { stop, leg, weight, opened, cap }) = scratch.open.pop() {
+            let Some(place) = self.place_at(stop, scratch) else { continue };
+            let mut space = stop.space;
+            if let Way::Instance(..) = stop.way {
+                space = scratch.spaces.len() as u32;
+                scratch.spaces.push(place);
+            }
             let Some(Weighed { group, importances, spreads, veils }) = self.weigh(&place) else {
                 continue;
             };
@@ -193,11 +231,12 @@ impl FrameTree<'_> {
                 // Barely open, the children together get no more samples than their parent could.
                 let cap = opened + (1.0 - opened) * cap * importances[lane] / sum;
                 let leg = on_route.filter(|&(own, _)| own == lane).map(|(_, leg)| leg);
-                let entry = match self.follow(&place, group, lane) {
+                let entry = match self.step(&place, group, lane) {
                     None => continue,
-                    Some(Next::Emitter(emitter)) => Entry::Light(Picked::Emitter(emitter)),
-                    Some(Next::Group(mut below)) => {
-                        below.veil = veils.map_or(1.0, |veils| veils[lane]);
+                    Some(Step::Emitter(emitter)) => Entry::Light(Picked::Emitter(emitter)),
+                    Some(Step::Cluster(way)) => {
+                        let stop =
+                            Stop { space, veil: veils.map_or(1.0, |veils| veils[lane]), way };
                         let part = weight * f64::from(spreads[lane]);
                         let excess = match how.test {
                             _ if how.is_full() => 1.0,
@@ -211,11 +250,11 @@ impl FrameTree<'_> {
                             let further = opened * excess.min(1.0);
                             variance += (opened - further) * part;
                             let opened = further;
-                            scratch.open.push(Opened { place: below, leg, weight, opened, cap });
+                            scratch.open.push(Opened { stop, leg, weight, opened, cap });
                             continue;
                         }
                         variance += opened * part;
-                        Entry::Cluster(below)
+                        Entry::Cluster(stop)
                     }
                 };
                 if let Some(leg) = leg {

@@ -50,8 +50,8 @@ impl FrameTree<'_> {
             Entry::Light(light) => {
                 Some(Pick { light, probability, expected, leftover: u, weighed: 0 })
             }
-            Entry::Cluster(place) => {
-                let pick = self.descend(place, u)?;
+            Entry::Cluster(stop) => {
+                let pick = self.descend(self.place_at(stop, scratch)?, u)?;
                 Some(Pick {
                     probability: pick.probability * probability,
                     expected: pick.probability * expected,
@@ -98,7 +98,7 @@ impl FrameTree<'_> {
         let (entry, leg) = cut.wanted?;
         let below = match scratch.entries[entry] {
             Entry::Light(found) => f64::from(u8::from(found == light)),
-            Entry::Cluster(place) => self.walk(place, &route, leg)?,
+            Entry::Cluster(stop) => self.walk(self.place_at(stop, scratch)?, &route, leg)?,
         };
         Some(cut.expected(scratch, entry) * below)
     }

@@ -38,6 +38,21 @@ pub(super) enum Next<V> {
     Group(Place<V>),
 }
 
+/// The same, before anything is done to go there: no viewer is copied, and no instance entered.
+pub(super) enum Step {
+    Emitter(u32),
+    Cluster(Way),
+}
+
+/// The way to a cluster from a place in the tree that its parent is in.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Way {
+    /// The group of that number, in the same tree.
+    Group(u32),
+    /// Into an instance of an earlier tree, by its row and the energy of the leaf that stands for it.
+    Instance(u32, f32),
+}
+
 /// The children of a cluster as one viewer sees them.
 pub(super) struct Weighed<'a> {
     pub group: &'a Group,
@@ -126,19 +141,34 @@ impl FrameTree<'_> {
         group: &Group,
         lane: usize,
     ) -> Option<Next<V>> {
+        match self.step(place, group, lane)? {
+            Step::Emitter(emitter) => Some(Next::Emitter(emitter)),
+            Step::Cluster(way) => self.go(place, way).map(Next::Group),
+        }
+    }
+
+    /// The first half of [`follow`](Self::follow).
+    #[inline]
+    pub(super) fn step<V>(&self, place: &Place<V>, group: &Group, lane: usize) -> Option<Step> {
         match group.link(lane) {
-            Link::Inner(ahead) => {
-                let at = place.at.checked_add(ahead)?;
-                Some(Next::Group(Place { at, ..*place }))
-            }
+            Link::Inner(ahead) => Some(Step::Cluster(Way::Group(place.at.checked_add(ahead)?))),
             Link::Emitter(own) => {
                 let emitter = place.first_emitter.checked_add(own)?;
-                (emitter < self.emitter_count).then_some(Next::Emitter(emitter))
+                (emitter < self.emitter_count).then_some(Step::Emitter(emitter))
             }
             Link::Instance(row) if built_in::INSTANCES => {
-                self.enter(place, row, group.energy(lane)).map(Next::Group)
+                Some(Step::Cluster(Way::Instance(row, group.energy(lane))))
             }
             Link::Instance(_) | Link::Nothing => None,
+        }
+    }
+
+    /// The other half, from any place in the tree.
+    #[inline]
+    pub(super) fn go<V: Viewer>(&self, from: &Place<V>, way: Way) -> Option<Place<V>> {
+        match way {
+            Way::Group(at) => Some(Place { at, ..*from }),
+            Way::Instance(row, energy) => self.enter(from, row, energy),
         }
     }
 

@@ -49,7 +49,10 @@ impl FrameTree<'_> {
                 match *entry {
                     _ if expected <= 0.0 => (0.0, 0.0),
                     Entry::Light(light) => (contribution(light, expected), 0.0),
-                    Entry::Cluster(place) => self.below(place, expected, contribution),
+                    Entry::Cluster(stop) => {
+                        let place = self.place_at(stop, &scratch);
+                        place.map_or((0.0, 0.0), |place| self.below(place, expected, contribution))
+                    }
                 }
             })
             .collect();

@@ -2,6 +2,7 @@
 
 use super::buffers::RenderBuffers;
 use super::camera::CameraRays;
+use super::direct::FoundByReflection;
 use super::film::{Film, Shown, half_of};
 use super::fog::Fog;
 use super::layers::Aov;
@@ -164,9 +165,13 @@ impl<'a> RenderDelegate<'a> {
             cells: learned.map(|learned| learned.cells),
             fog: Fog::new(self.scene, &pose, &self.camera),
             groups: self.plan.as_ref().ok().and_then(|plan| plan.groups.as_ref()),
-            reflections_find_light: self.settings.mis
-                && (self.has_surfaces_that_shine
-                    || infinite.iter().any(InfiniteLight::meets_reflections)),
+            found_by_reflection: match self.settings.mis {
+                true if infinite.iter().any(InfiniteLight::meets_reflections) => {
+                    FoundByReflection::Everything
+                }
+                true if self.has_surfaces_that_shine => FoundByReflection::Surfaces,
+                _ => FoundByReflection::Nothing,
+            },
         }))
     }
 

@@ -25,7 +25,27 @@ pub struct Incoming {
     pub shadow_set: Option<u32>,
 }
 
+/// What light reflected rays may find by themselves.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FoundByReflection {
+    /// None.
+    Nothing,
+    /// That of surfaces.
+    Surfaces,
+    /// That of lights at infinity, too.
+    Everything,
+}
+
 impl Integrator<'_> {
+    /// Whether a reflected ray may find light, hidden or not.
+    pub(super) fn may_find_light(&self, origin: Vec3, direction: Vec3) -> bool {
+        match self.found_by_reflection {
+            FoundByReflection::Nothing => false,
+            FoundByReflection::Surfaces => self.tracer.may_meet_light(origin, direction),
+            FoundByReflection::Everything => true,
+        }
+    }
+
     /// What a vertex reflects of the lights that are picked for it. `u_pick` picks the lights, `u` samples
     /// points on them, and `salt` is a hash of the pixel and the bounce. `throughput` is the share of the
     /// reflected light that gets to the eye: the result is without it.

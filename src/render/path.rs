@@ -8,7 +8,7 @@
 
 use super::bsdf::Reflection;
 use super::camera::{CameraRay, CameraRays};
-use super::direct::power_heuristic;
+use super::direct::{FoundByReflection, power_heuristic};
 use super::fog::Fog;
 use super::knob::Trial;
 use super::light_groups::LightGroups;
@@ -55,8 +55,8 @@ pub struct Integrator<'a> {
     pub fog: Option<Fog>,
     /// Which light group each light is in, if that is asked for.
     pub groups: Option<&'a LightGroups>,
-    /// Whether a reflected ray may find light by itself. If not, the last one of a path is not traced.
-    pub reflections_find_light: bool,
+    /// What light reflected rays may find by themselves. The last one of a path is traced only if it may find some.
+    pub found_by_reflection: FoundByReflection,
 }
 
 /// What one path saw. Its light by group is in [`PathScratch::by_group`].
@@ -225,7 +225,8 @@ impl Integrator<'_> {
             let at = (bounce, throughput);
             let direct = self.direct(&vertex, &wanted, numbers, &accept, at, scratch);
             seen.add(bounce + 1, throughput * direct);
-            if bounce + 1 == self.settings.depth && !self.reflections_find_light {
+            let is_last = bounce + 1 == self.settings.depth;
+            if is_last && self.found_by_reflection == FoundByReflection::Nothing {
                 break;
             }
 
@@ -247,6 +248,9 @@ impl Integrator<'_> {
             before = Some(Origin { wanted, how, point, normal, bsdf_pdf: next.pdf });
             origin = vertex.anchor.origin_toward(next.wi);
             direction = next.wi;
+            if is_last && !self.may_find_light(origin, direction) {
+                break;
+            }
         }
         seen
     }

@@ -1,7 +1,8 @@
 //! A set of triangles that a ray can search: the lower level of the kernel.
 
 use super::triangles::{Block, Ray, ShearedRay, plane_distance};
-use super::wide_bvh::{BoxRay, LEAF_SIZE, NONE, WideBvh};
+use super::wide_bvh::{LEAF_SIZE, WideBvh};
+use super::wide_node::{BoxRay, NONE};
 use crate::bounds::Aabb;
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
@@ -77,24 +78,8 @@ impl Blas {
 
     /// Calls `met` with the triangles that the ray meets at a distance in `(0, tmax)`, near ones
     /// roughly first if `ORDERED`. It returns the new `tmax`; a negative one ends the search.
-    #[inline]
+    #[inline(always)]
     pub fn visit<const ORDERED: bool>(
-        &self,
-        ray: &Ray,
-        tmax: f64,
-        met: impl FnMut(&BlasHit) -> f64,
-    ) {
-        let d = ray.direction.abs();
-        if d.x >= d.y && d.x >= d.z {
-            self.visit_along::<ORDERED, 0>(ray, tmax, met)
-        } else if d.y >= d.z {
-            self.visit_along::<ORDERED, 1>(ray, tmax, met)
-        } else {
-            self.visit_along::<ORDERED, 2>(ray, tmax, met)
-        }
-    }
-
-    fn visit_along<const ORDERED: bool, const KZ: usize>(
         &self,
         ray: &Ray,
         mut tmax: f64,
@@ -102,7 +87,7 @@ impl Blas {
     ) {
         let (origin, direction) = (ray.origin.as_vec3(), ray.direction.as_vec3());
         let box_ray = BoxRay::new(origin, direction);
-        let sheared = ShearedRay::<KZ>::new(origin, direction);
+        let sheared = ShearedRay::new(origin, direction);
         let mut bound = search_limit(tmax);
         self.tree.walk::<ORDERED>(&box_ray, bound, |leaf| {
             let block = &self.blocks[leaf as usize];
@@ -132,7 +117,8 @@ pub fn search_limit(t: f64) -> f32 {
     t as f32 * 1.000_002
 }
 
-fn can_be_hit(&[a, b, c]: &[Vec3; 3]) -> bool {
+/// Whether any ray can meet a triangle.
+pub fn can_be_hit(&[a, b, c]: &[Vec3; 3]) -> bool {
     let small = |p: Vec3| p.abs().cmple(Vec3::splat(LARGEST_COORDINATE)).all();
     small(a) && small(b) && small(c) && {
         let (a, b, c) = (a.as_dvec3(), b.as_dvec3(), c.as_dvec3());

@@ -28,6 +28,7 @@ mod binary_bvh;
 mod blas;
 mod meeting;
 mod prim;
+mod shining;
 mod sight;
 mod sphere;
 #[cfg(test)]
@@ -35,6 +36,7 @@ mod tests;
 mod tracer;
 mod triangles;
 mod wide_bvh;
+mod wide_node;
 
 pub use anchor::Anchor;
 pub use meeting::{Hit, HitSurface};
@@ -46,6 +48,7 @@ use crate::scene::{Instance, Mesh, Pose, Scene};
 use blas::{Blas, TriangleId};
 use glam::{DAffine3, DMat3, Vec3};
 use rayon::prelude::*;
+use shining::Shining;
 use std::collections::HashMap;
 
 /// A mesh whose copies would add more triangles than this keeps one set for all its instances...
@@ -58,6 +61,8 @@ const TINY_MESH: usize = 32;
 pub struct RayScene {
     /// Everything that stands still and is not shared, in world space.
     fixed: Blas,
+    /// What of that may shine.
+    shining: Shining,
     /// Sets in local space.
     shared: Vec<Blas>,
     /// Instances of the shared sets.
@@ -96,11 +101,15 @@ impl RayScene {
             Blas::build(&triangles, &ids)
         };
         let parts: Vec<_> = flat.par_iter().map(|&i| in_world(scene, pose, i)).collect();
+        let shining = flat.iter().zip(&parts).filter(|(row, _)| may_shine(scene, **row));
+        let shining = shining.map(|(_, (triangles, _))| triangles.as_slice()).collect::<Vec<_>>();
+        let shining = Shining::around_meshes(&shining);
         let triangles = parts.iter().flat_map(|part| &part.0).copied().collect::<Vec<_>>();
         let ids = parts.iter().flat_map(|part| &part.1).copied().collect::<Vec<_>>();
         drop(parts);
         RayScene {
             fixed: Blas::build(&triangles, &ids),
+            shining,
             shared: meshes.par_iter().map(local).collect(),
             placed,
             ranks: ranks(&scene.instances),
@@ -127,6 +136,11 @@ pub fn kept_in_own_space(scene: &Scene) -> Vec<bool> {
         moving[instance.node as usize] || (size > TINY_MESH && copied > COPIED_TRIANGLES)
     };
     scene.instances.iter().map(is_kept).collect()
+}
+
+/// Whether an instance shines at any time.
+fn may_shine(scene: &Scene, instance: u32) -> bool {
+    scene.peak_rgb_of_instance(instance).max_element() > 0.0
 }
 
 /// The place of each instance in the order of paths.

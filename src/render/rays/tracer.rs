@@ -3,13 +3,16 @@
 use super::blas::{Blas, LARGEST_COORDINATE, search_limit};
 use super::meeting::{Meeting, On, Space};
 use super::prim::{Prim, Sender};
+use super::shining::Shining;
 use super::sight::{Seen, SeenLight, Sight};
 use super::sphere::Sphere;
 use super::triangles::{Ray, barycentric};
-use super::wide_bvh::{BoxRay, NONE, WideBvh};
-use super::{Anchor, RayScene, in_world, world_of};
+use super::wide_bvh::WideBvh;
+use super::wide_node::{BoxRay, NONE};
+use super::{Anchor, RayScene, in_world, may_shine, world_of};
 use crate::bounds::Aabb;
 use crate::math::built_in;
+use crate::math::widest::{Work, widest};
 use crate::scene::{LightKind, Pose, Scene};
 use glam::{DAffine3, DVec3, Vec2, Vec3};
 
@@ -18,6 +21,8 @@ use glam::{DAffine3, DVec3, Vec2, Vec3};
 pub struct Tracer<'a> {
     scene: &'a RayScene,
     tree: WideBvh,
+    /// Boxes of those that may shine.
+    shining: Shining,
     /// What the leaves of the tree are.
     items: Vec<Item<'a>>,
     /// By instance.
@@ -52,6 +57,7 @@ enum Item<'a> {
 impl<'a> Tracer<'a> {
     pub(super) fn new(prepared: &'a RayScene, scene: &Scene, pose: &Pose) -> Tracer<'a> {
         let (mut boxes, mut unordered) = (Vec::new(), Vec::new());
+        let mut shining = Vec::new();
         for placed in &prepared.placed {
             let node = scene.instances[placed.instance as usize].node;
             let to_world = world_of(pose, node);
@@ -68,6 +74,7 @@ impl<'a> Tracer<'a> {
                 (Item::Flattened { set }, bounds)
             };
             if let Some(bounds) = bounds.filter(is_sound) {
+                shining.extend(may_shine(scene, placed.instance).then_some(bounds));
                 boxes.push(bounds);
                 unordered.push(item);
             }
@@ -76,6 +83,8 @@ impl<'a> Tracer<'a> {
             let radius = DVec3::splat(sphere.radius_m);
             let bounds = outward(sphere.center - radius, sphere.center + radius);
             if is_sound(&bounds) {
+                let may_shine = scene.peak_rgb_of_light(sphere.light).max_element() > 0.0;
+                shining.extend(may_shine.then_some(bounds));
                 boxes.push(bounds);
                 unordered.push(Item::Sphere(sphere));
             }
@@ -90,7 +99,8 @@ impl<'a> Tracer<'a> {
         let light = |row: u32| Prim::sphere(scene, pose, row, of_instances + row);
         let instances = (0..of_instances).map(instance).collect();
         let lights = (0..scene.lights.len() as u32).map(light).collect();
-        Tracer { scene: prepared, tree, items, instances, lights }
+        let shining = Shining::around(&shining);
+        Tracer { scene: prepared, tree, shining, items, instances, lights }
     }
 
     /// What a ray sees at distances in `(0, tmax)`, in lengths of `direction`; the lights among it go
@@ -115,6 +125,12 @@ impl<'a> Tracer<'a> {
             sight.limit()
         });
         sight.finish()
+    }
+
+    /// Whether a ray may meet a prim that shines, hidden or not. If not, [`look`](Self::look) finds no light.
+    pub fn may_meet_light(&self, origin: Vec3, direction: Vec3) -> bool {
+        let ray = BoxRay::new(origin, direction);
+        self.shining.may_be_met(&ray) || self.scene.shining.may_be_met(&ray)
     }
 
     /// Whether anything that casts shadows stands at a distance in `(0, tmax)`, in lengths of
@@ -195,7 +211,18 @@ impl<'a> Tracer<'a> {
 
     /// Calls `met` with everything that a ray meets at a distance in `(0, tmax)`, near things roughly
     /// first if `ORDERED`. It returns the new `tmax`; a negative one ends the search.
+    #[inline]
     fn visit<'b, const ORDERED: bool>(
+        &'b self,
+        ray: &Ray,
+        tmax: f64,
+        met: impl FnMut(&Meeting<'b>) -> f64,
+    ) {
+        widest(Visit::<ORDERED, _> { tracer: self, ray, tmax, met });
+    }
+
+    #[inline(always)]
+    fn visit_all<'b, const ORDERED: bool>(
         &'b self,
         ray: &Ray,
         mut tmax: f64,
@@ -238,6 +265,23 @@ impl<'a> Tracer<'a> {
             On::Triangle { id, .. } => &self.instances[id.instance as usize],
             On::Sphere(sphere) => &self.lights[sphere.light as usize],
         }
+    }
+}
+
+/// A search for what a ray meets.
+struct Visit<'v, 'b, const ORDERED: bool, F> {
+    tracer: &'b Tracer<'b>,
+    ray: &'v Ray,
+    tmax: f64,
+    met: F,
+}
+
+impl<'b, const ORDERED: bool, F: FnMut(&Meeting<'b>) -> f64> Work for Visit<'_, 'b, ORDERED, F> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run(self) {
+        self.tracer.visit_all::<ORDERED>(self.ray, self.tmax, self.met);
     }
 }
 

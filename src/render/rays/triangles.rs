@@ -17,29 +17,38 @@ pub struct Ray {
     pub direction: DVec3,
 }
 
-/// What Woop's test needs of a ray whose largest direction component is `KZ`.
+/// What Woop's test needs of a ray.
 #[derive(Clone, Copy, Debug)]
-pub struct ShearedRay<const KZ: usize> {
+pub struct ShearedRay {
+    /// By axis, in the order of `axes`.
     origin: [Vec4; 3],
     shear_x: Vec4,
     shear_y: Vec4,
     scale_z: Vec4,
+    /// Which axes play the parts of x, y and z: the direction's largest component is that of the last.
+    axes: [usize; 3],
 }
 
-impl<const KZ: usize> ShearedRay<KZ> {
-    const KX: usize = (KZ + 1) % 3;
-    const KY: usize = (KZ + 2) % 3;
-
-    /// `direction[KZ]` must not be 0.
+impl ShearedRay {
+    /// The direction must not be 0.
     #[inline]
     pub fn new(origin: Vec3, direction: Vec3) -> Self {
-        let d = direction.to_array();
-        let scale = 1.0 / d[KZ];
+        let size = direction.abs();
+        let axes = if size.x >= size.y && size.x >= size.z {
+            [1, 2, 0]
+        } else if size.y >= size.z {
+            [2, 0, 1]
+        } else {
+            [0, 1, 2]
+        };
+        let [x, y, z] = axes.map(|axis| direction[axis]);
+        let scale = 1.0 / z;
         ShearedRay {
-            origin: origin.to_array().map(Vec4::splat),
-            shear_x: Vec4::splat(d[Self::KX] * scale),
-            shear_y: Vec4::splat(d[Self::KY] * scale),
+            origin: axes.map(|axis| Vec4::splat(origin[axis])),
+            shear_x: Vec4::splat(x * scale),
+            shear_y: Vec4::splat(y * scale),
             scale_z: Vec4::splat(scale),
+            axes,
         }
     }
 }
@@ -70,15 +79,11 @@ impl Block {
 
     /// A bit for each lane whose triangle the line goes through, some of it between 0 and `tmax`.
     #[inline(always)]
-    pub fn candidates<const KZ: usize>(&self, ray: &ShearedRay<KZ>, tmax: f32) -> u32 {
+    pub fn candidates(&self, ray: &ShearedRay, tmax: f32) -> u32 {
         let [a, b, c] = [0, 1, 2].map(|corner| {
-            let corner: &[Vec4; 3] = &self.corners[corner];
-            let z = corner[KZ] - ray.origin[KZ];
-            let kx = ShearedRay::<KZ>::KX;
-            let ky = ShearedRay::<KZ>::KY;
-            let x = (corner[kx] - ray.origin[kx]) - ray.shear_x * z;
-            let y = (corner[ky] - ray.origin[ky]) - ray.shear_y * z;
-            (x, y, z * ray.scale_z)
+            let [x, y, z] =
+                [0, 1, 2].map(|part| self.corners[corner][ray.axes[part] % 3] - ray.origin[part]);
+            (x - ray.shear_x * z, y - ray.shear_y * z, z * ray.scale_z)
         });
         let u = c.0 * b.1 - c.1 * b.0;
         let v = a.0 * c.1 - a.1 * c.0;

@@ -264,3 +264,61 @@ fn an_unlit_lamp_is_not_there() {
         assert!(!tracer.occluded(from, Vec3::Z, 1.5, &ALL));
     }
 }
+
+/// What a look finds, the boxes around what shines must not rule out; and they do rule out what is elsewhere.
+#[test]
+fn a_ray_that_sees_a_light_may_meet_light() {
+    let mut numbers = Numbers(61);
+    let (mut seen, mut ruled_out) = (0, 0);
+    for scale in [1e-6_f32, 1.0, 1e6] {
+        // Lamps that stand and lamps that move, among walls; one sphere.
+        let lamp = || glowing(panel(0.05 * scale, 0.0));
+        let mut parts_of = Vec::new();
+        for i in 0..40 {
+            let at = (numbers.point() - 0.5) * scale;
+            let turn =
+                DQuat::from_rotation_arc(DVec3::Z, numbers.direction().as_dvec3().normalize());
+            let mesh = if i % 4 == 0 { panel(0.3 * scale, 0.0) } else { lamp() };
+            parts_of.push((
+                ["/wall", "/lamp"][usize::from(i % 4 != 0)],
+                mesh,
+                parts(at.as_dvec3(), turn, DVec3::ONE),
+            ));
+        }
+        let mut scene = named(parts_of);
+        for node in scene.nodes.iter_mut().step_by(3) {
+            *node = turning(node.clone());
+        }
+        let node = scene.nodes.len() as u32;
+        scene.nodes.push(Node::fixed(
+            "/ball",
+            None,
+            parts(DVec3::splat(0.6 * f64::from(scale)), DQuat::IDENTITY, DVec3::ONE),
+        ));
+        scene.lights.push(Light {
+            node,
+            kind: LightKind::Sphere { radiance_nits: Rgb::ONE, radius: 0.1 * scale, shaping: None },
+            values: None,
+            range_m: None,
+            forced: false,
+            visibility: Visibility::ALL,
+        });
+        for time in [0.0, 0.7] {
+            let pose = scene.pose_at(time);
+            let prepared = RayScene::new(&scene, &scene.pose_at(0.0));
+            let tracer = prepared.for_pose(&scene, &pose);
+            let mut lights = Vec::new();
+            for _ in 0..4000 {
+                let (origin, direction) =
+                    ((numbers.point() * 2.0 - 1.0) * scale, numbers.direction());
+                let ray = (origin, direction, f32::INFINITY);
+                tracer.look(Sender::Surface, ray, &ALL, &mut lights);
+                let may = tracer.may_meet_light(origin, direction);
+                assert!(may || lights.is_empty(), "{scale}, {time}: {lights:?}");
+                seen += usize::from(!lights.is_empty());
+                ruled_out += usize::from(!may);
+            }
+        }
+    }
+    assert!(seen > 100 && ruled_out > 12_000, "{seen} saw a light, {ruled_out} were ruled out");
+}
