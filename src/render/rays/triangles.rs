@@ -73,18 +73,27 @@ impl Block {
     }
 
     /// The corners in a lane.
+    #[inline(always)]
     pub fn get(&self, lane: usize) -> [DVec3; 3] {
-        self.corners.map(|corner| DVec3::from(corner.map(|axis| f64::from(axis[lane]))))
+        let corner = |[x, y, z]: &[Vec4; 3]| {
+            DVec3::new(f64::from(x[lane]), f64::from(y[lane]), f64::from(z[lane]))
+        };
+        let [a, b, c] = &self.corners;
+        [corner(a), corner(b), corner(c)]
     }
 
     /// A bit for each lane whose triangle the line goes through, some of it between 0 and `tmax`.
     #[inline(always)]
     pub fn candidates(&self, ray: &ShearedRay, tmax: f32) -> u32 {
-        let [a, b, c] = [0, 1, 2].map(|corner| {
-            let [x, y, z] =
-                [0, 1, 2].map(|part| self.corners[corner][ray.axes[part] % 3] - ray.origin[part]);
-            (x - ray.shear_x * z, y - ray.shear_y * z, z * ray.scale_z)
-        });
+        let [kx, ky, kz] = ray.axes;
+        let sheared = |corner: &[Vec4; 3]| {
+            let z = corner[kz % 3] - ray.origin[2];
+            let x = (corner[kx % 3] - ray.origin[0]) - ray.shear_x * z;
+            let y = (corner[ky % 3] - ray.origin[1]) - ray.shear_y * z;
+            (x, y, z * ray.scale_z)
+        };
+        let (a, b, c) =
+            (sheared(&self.corners[0]), sheared(&self.corners[1]), sheared(&self.corners[2]));
         let u = c.0 * b.1 - c.1 * b.0;
         let v = a.0 * c.1 - a.1 * c.0;
         let w = b.0 * a.1 - b.1 * a.0;
@@ -99,7 +108,7 @@ impl Block {
 }
 
 /// Distance along the ray to the triangle's plane, or `None` if it runs along it.
-#[inline]
+#[inline(always)]
 pub fn plane_distance(ray: &Ray, [a, b, c]: [DVec3; 3]) -> Option<f64> {
     let normal = (b - a).cross(c - a);
     let along = normal.dot(ray.direction);

@@ -25,6 +25,19 @@ pub struct WideBvh {
     stack: usize,
 }
 
+/// What happens at the leaves that a ray enters. Not every closure is inlined, and what is not keeps narrow registers.
+pub trait Visitor {
+    /// Takes a leaf's number and returns the new `tmax`; a negative one ends the walk.
+    fn visit(&mut self, leaf: u32) -> f32;
+}
+
+impl<F: FnMut(u32) -> f32> Visitor for F {
+    #[inline(always)]
+    fn visit(&mut self, leaf: u32) -> f32 {
+        self(leaf)
+    }
+}
+
 impl WideBvh {
     /// Builds over boxes, with leaves of up to `leaf_size <= LEAF_SIZE` of them. Returns the box numbers of
     /// each leaf, in leaf order, padded with [`NONE`]. Every box must be finite.
@@ -36,14 +49,8 @@ impl WideBvh {
     }
 
     /// Visits the leaves whose boxes the ray enters before `tmax`, near ones first if `ORDERED`.
-    /// `visit` takes a leaf's number and returns the new `tmax`; a negative one ends the walk.
     #[inline(always)]
-    pub fn walk<const ORDERED: bool>(
-        &self,
-        ray: &BoxRay,
-        tmax: f32,
-        visit: impl FnMut(u32) -> f32,
-    ) {
+    pub fn walk<const ORDERED: bool>(&self, ray: &BoxRay, tmax: f32, visitor: impl Visitor) {
         if self.nodes.is_empty() {
             return;
         }
@@ -58,7 +65,7 @@ impl WideBvh {
             deeper = vec![(0, 0.0); self.stack];
             &mut deeper
         };
-        self.walk_on::<ORDERED>(ray, tmax, stack, visit);
+        self.walk_on::<ORDERED>(ray, tmax, stack, visitor);
     }
 
     #[inline(always)]
@@ -67,13 +74,13 @@ impl WideBvh {
         ray: &BoxRay,
         mut tmax: f32,
         stack: &mut [(u32, f32)],
-        mut visit: impl FnMut(u32) -> f32,
+        mut visitor: impl Visitor,
     ) {
         let mut depth = 0;
         let mut current = 0;
         loop {
             if current & LEAF != 0 {
-                tmax = visit(current & !LEAF);
+                tmax = visitor.visit(current & !LEAF);
                 if tmax < 0.0 {
                     return;
                 }

@@ -7,7 +7,7 @@
 //! is proven of boxes in single precision (Ize 2013, "Robust BVH Ray Traversal") holds here, too.
 
 use crate::bounds::Aabb;
-use glam::Vec3;
+use glam::{Vec3, Vec4};
 
 /// Most children of a node. Eight are 10 % faster than four.
 pub const FAN: usize = 8;
@@ -119,12 +119,15 @@ impl WideNode {
                 far[lane] = if leave < far[lane] { leave } else { far[lane] };
             }
         }
-        let mut hits = 0;
         for lane in 0..FAN {
-            let is_hit = near[lane] <= far[lane] * FAR_SLACK && near[lane] <= tmax;
-            hits |= u32::from(is_hit) << lane;
+            let leave = far[lane] * FAR_SLACK;
+            far[lane] = if leave < tmax { leave } else { tmax };
         }
-        (near, hits & u32::from(self.used))
+        let half = |lanes: &[f32; FAN], first: usize| {
+            Vec4::new(lanes[first], lanes[first + 1], lanes[first + 2], lanes[first + 3])
+        };
+        let hits = |first: usize| half(&near, first).cmple(half(&far, first)).bitmask();
+        (near, (hits(0) | hits(4) << 4) & u32::from(self.used))
     }
 }
 
