@@ -49,9 +49,8 @@ impl Ground {
             let of = |there: bool, back: usize| if there { sums[at - back] } else { [0.0; 2] };
             let (left, up) = (of(x > 0, 1), of(y > 0, across));
             let both = of(x > 0 && y > 0, across + 1);
-            for i in 0..2 {
-                sums[at][i] += left[i] + up[i] - both[i];
-            }
+            let sum = |i: usize| sums[at][i] + left[i] + up[i] - both[i];
+            sums[at] = [sum(0), sum(1)];
         }
         Raster(RgbaImage::from_fn(self.columns as u32, self.rows as u32, |x, y| {
             let [count, sum] = sums[y as usize * across + x as usize];

@@ -66,6 +66,7 @@ fn laws_hold<V: Viewer>(
         let u = (f64::from(i) + 0.5) / 32.0;
         let mut picks = Vec::new();
         tree.for_each_pick(&veiled, beside, how, (u, i), &mut scratch, |pick| picks.push(pick));
+        prop_assert!(picks.len() <= how.most as usize, "{} picks", picks.len());
         for pick in picks {
             let told = tree.expected(&veiled, beside, how, pick.light, &mut fresh);
             prop_assert!((pick.expected - told).abs() <= 1e-12 * told, "{pick:?} but {told}");
