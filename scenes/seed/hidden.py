@@ -1,4 +1,5 @@
-"""Two scenes whose strongest light is behind something: two rooms with a door, and a sun behind a house."""
+"""Scenes whose strongest light is behind something: two rooms with a door, the same with a door that opens over the
+frames, and a sun behind a house."""
 
 import numpy as np
 from kit import Stage, aimed, ball
@@ -10,7 +11,18 @@ TALL = 3.0
 def write_rooms(path):
     """The camera stands in a room with twenty small lamps. A lamp 10,000 times as bright as one of them
     hangs in the room next door, whose door is open: it lights a wedge of floor here, and no more."""
-    stage = Stage("Two rooms, one door, a strong lamp behind the wall. Written by scenes/seed/hidden.py")
+    rooms(Stage("Two rooms, one door, a strong lamp behind the wall. Written by scenes/seed/hidden.py")).save(path)
+
+
+def write_opening_door(path):
+    """The same, and the door slides open from frame 1 to frame 25."""
+    stage = rooms(Stage("Two rooms, a door that opens, a strong lamp behind. Written by scenes/seed/hidden.py"))
+    door = stage.material("door", (0.4, 0.3, 0.2), ior=1)
+    stage.sliding_box("door", door, (-0.04, 3.5, 0), (0.04, 4.5, 2.1), by=(0, 1, 0), frames=25)
+    stage.save(path)
+
+
+def rooms(stage):
     plaster = stage.material("plaster", (0.6, 0.58, 0.54), ior=1)
     floor = stage.material("floor", (0.35, 0.28, 0.2), ior=1)
     clay = stage.material("clay", (0.5, 0.3, 0.2), ior=1)
@@ -38,7 +50,7 @@ def write_rooms(path):
             stage.point(f"lamp_{i}", at, (1, 0.8, 0.6), 1)
         stage.light("SphereLight", "strong", (3.5, 1.2, 1.5), (0.8, 0.9, 1), 1e4 / (np.pi * 0.05**2), radius=0.05)
     stage.camera((-5.6, 0.4, 1.7), (-1.8, 4.2, 0.9), 75)
-    stage.save(path)
+    return stage
 
 
 def write_house(path):

@@ -35,7 +35,7 @@ class Stage:
     """One .usda file below `/World`. `with stage.prim(...)` puts what is written meanwhile inside it."""
 
     def __init__(self, doc):
-        self.doc, self.depth, self.lines, self.materials = doc, 1, [], {}
+        self.doc, self.depth, self.lines, self.materials, self.frames = doc, 1, [], {}, 0
 
     def put(self, *lines):
         self.lines += ["    " * self.depth + line for line in lines]
@@ -64,6 +64,16 @@ class Stage:
     def box(self, name, material, low, high):
         low, high = np.array(low, float), np.array(high, float)
         self.shape("Cube", name, material, (low + high) / 2, high - low)
+
+    def sliding_box(self, name, material, low, high, by, frames):
+        """A box that slides from frame 1 to the last."""
+        low, high, self.frames = np.array(low, float), np.array(high, float), frames
+        body = ["double size = 1", *place((low + high) / 2, 0.0, high - low), bind(material)]
+        ends = {1: (low + high) / 2, frames: (low + high) / 2 + by}
+        keys = ", ".join(f"{frame}: {vec(at)}" for frame, at in ends.items())
+        body[1] = f"double3 xformOp:translate.timeSamples = {{ {keys} }}"
+        with self.prim("Cube", name, body, BINDS):
+            pass
 
     def mesh(self, name, points, triangles, material, smooth=False, glow=None):
         """Triangles, counter-clockwise seen from outside. `glow` is (color, nits) and makes a mesh light."""
@@ -131,6 +141,8 @@ class Stage:
 
     def save(self, path):
         head = ["#usda 1.0", "(", f'    doc = """{self.doc}"""', '    defaultPrim = "World"']
+        if self.frames:
+            head += ["    startTimeCode = 1", f"    endTimeCode = {self.frames}", "    timeCodesPerSecond = 24"]
         head += ["    metersPerUnit = 1", '    upAxis = "Z"', ")", "", 'def Xform "World"', "{"]
         with self.prim("Scope", "Materials"):
             for name, inputs in self.materials.items():

@@ -32,6 +32,7 @@ SCENES = {
     "fog_spots": fog_spots.write,
     "textured_lights": textured_lights.write,
     "two_rooms": hidden.write_rooms,
+    "opening_door": hidden.write_opening_door,
     "behind_house": hidden.write_house,
     "linked": linked.write,
 }

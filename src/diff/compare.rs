@@ -87,6 +87,7 @@ pub fn compare(before: &Side, after: &Side, options: &DiffOptions) -> Result<Dif
         totals: totals(tallies, &changes, pairs.count),
         picking,
         changes,
+        table: None,
         unchanged: marked.par_iter().filter_map(mark).collect(),
         heat,
     };
@@ -118,6 +119,7 @@ fn same([before, after]: [SideName; 2], tally: Tally) -> Diff {
         totals: totals([tally; 2], &[], tally.lights),
         picking: None,
         changes: Vec::new(),
+        table: None,
         unchanged: Vec::new(),
         heat: None,
     }

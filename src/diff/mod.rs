@@ -23,6 +23,7 @@
 //! | `totals` | how many lights and how much of them, before and after |
 //! | `picking`, `probes` | how far the probabilities of picks moved, and where that is measured |
 //! | `heat` | where in a camera's view direct light changed |
+//! | `table` | whether a table of what is hidden is out of date, and why |
 //! | `compare`, `folder` | all of this of two versions; of all shots in two folders |
 //! | `text`, [`json`], `html` | for people, for programs, as a page |
 
@@ -48,6 +49,7 @@ mod profile;
 mod scene_side;
 mod side;
 mod sight;
+mod table;
 mod text;
 mod totals;
 mod tree_side;
@@ -60,7 +62,8 @@ pub use heat::{HeatCell, HeatMap};
 pub use html::html;
 pub use picking::{PickingChange, ProbePlaces};
 pub use side::{Side, SideError};
-pub use sight::look_at_both;
+pub use sight::{look_at, look_at_both};
+pub use table::{TableDiff, TableStanding, VersionName, names_table};
 pub use text::Text;
 pub use totals::{Tally, Totals};
 
@@ -79,6 +82,9 @@ pub struct Diff {
     pub picking: Option<PickingChange>,
     /// The lights that differ, by descending [`Change::share`].
     pub changes: Vec<Change>,
+    /// A table of what is hidden, against the version after. Only if one is named.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub table: Option<TableStanding>,
     /// The lights that are the same in both versions, for a picture of the whole. Only if asked for.
     #[serde(skip)]
     pub unchanged: Vec<Mark>,

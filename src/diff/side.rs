@@ -7,7 +7,7 @@ use super::tree_side::TreeSide;
 use crate::emitter::LightOverflow;
 use crate::ingest::IngestError;
 use crate::light_tree::LightTree;
-use crate::pipeline::{self, OpenedTree, TreeError, ViewError};
+use crate::pipeline::{self, LearnedError, OpenedTree, TreeError, ViewError};
 use crate::scene::{Camera, Scene};
 use crate::store::AlignedBytes;
 use glam::DVec3;
@@ -35,6 +35,9 @@ pub enum SideError {
     /// A scene cannot be read.
     #[error(transparent)]
     Scene(#[from] IngestError),
+    /// A table of what is hidden cannot be used.
+    #[error(transparent)]
+    Table(#[from] LearnedError),
     /// There is no camera to look through.
     #[error(transparent)]
     View(#[from] ViewError),
@@ -134,7 +137,7 @@ impl Side {
         }
     }
 
-    fn opened(&self) -> Option<&OpenedTree> {
+    pub(super) fn opened(&self) -> Option<&OpenedTree> {
         match &self.content {
             Content::Tree(tree) => Some(tree),
             Content::Scene(_) => None,

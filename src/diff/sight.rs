@@ -39,6 +39,18 @@ pub fn look_at_both(
     Ok(note)
 }
 
+/// Chooses the camera of a version that nothing else is looked at beside, as a renderer would: a tree has none.
+/// Returns a note on where it is, if the user did not say.
+///
+/// # Errors
+/// If there is no such camera, or the view contradicts itself.
+pub fn look_at(version: &mut Side, view: &View) -> Result<Option<String>, ViewError> {
+    let Some(scene) = version.scene_mut() else { return Ok(None) };
+    let found = look(scene, view, ASPECT)?;
+    version.camera = Some(found.camera);
+    Ok(found.note)
+}
+
 /// Gives a scene without a camera the camera of another scene.
 fn follow(side: &mut Side, other: &Side) {
     let (Some(there), Some(camera)) = (other.scene(), other.camera()) else { return };

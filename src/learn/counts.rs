@@ -3,6 +3,7 @@
 use super::pool::{Known, Tally};
 use crate::light_tree::learned::BESIDE;
 use crate::light_tree::{Cell, FrameTree, Front, FrontGroup, Picked, Receiver, WIDTH};
+use glam::Vec3;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicU32, Ordering};
 
@@ -14,6 +15,9 @@ pub struct Counts {
     lanes: Vec<Count>,
 }
 
+/// Of no cell, to ask how many lights there are.
+const ANYWHERE: Receiver = Receiver { point: Vec3::ZERO, normal: Vec3::Y };
+
 /// Rays to a cluster.
 #[derive(Default)]
 struct Count {
@@ -23,16 +27,27 @@ struct Count {
 
 impl Counts {
     /// Nothing counted yet. `lookers` are receivers of each cell; `most` groups are looked into in each, and
-    /// so many lights `beside` the tree.
-    pub fn new(tree: &FrameTree, lookers: &[Vec<Receiver>], most: usize, beside: usize) -> Counts {
-        let rows = (0..beside.div_ceil(WIDTH) as u32).map(|row| FrontGroup {
-            group: BESIDE + row,
-            importances: [0.0; WIDTH],
-            inner: [None; WIDTH],
-        });
+    /// all lights beside the tree: `beside` gives their importances.
+    pub fn new(
+        tree: &FrameTree,
+        lookers: &[Vec<Receiver>],
+        most: usize,
+        beside: impl Fn(&Receiver) -> Vec<f64> + Sync,
+    ) -> Counts {
         let front = |lookers: &Vec<Receiver>| {
             let mut front = tree.front(lookers, most);
-            front.groups.extend(rows.clone());
+            let of_each: Vec<Vec<f64>> = lookers.iter().map(&beside).collect();
+            let count = of_each.first().map_or_else(|| beside(&ANYWHERE).len(), Vec::len);
+            let mean = |light: usize| {
+                let sum: f64 = of_each.iter().filter_map(|own| own.get(light)).sum();
+                sum / of_each.len().max(1) as f64
+            };
+            let rows = (0..count.div_ceil(WIDTH)).map(|row| FrontGroup {
+                group: BESIDE + row as u32,
+                importances: std::array::from_fn(|lane| mean(row * WIDTH + lane)),
+                inner: [None; WIDTH],
+            });
+            front.groups.extend(rows);
             front
         };
         let fronts: Vec<Front> = lookers.par_iter().map(front).collect();
@@ -66,11 +81,14 @@ impl Counts {
         self.lanes.iter().map(|count| u64::from(count.sent.load(Ordering::Relaxed))).sum()
     }
 
-    /// The share of them that did not arrive.
+    /// The share of them that did not arrive; 0 if there are none.
     pub fn hidden(&self) -> f64 {
+        if self.sent() == 0 {
+            return 0.0;
+        }
         let seen: u64 =
             self.lanes.iter().map(|count| u64::from(count.seen.load(Ordering::Relaxed))).sum();
-        1.0 - seen as f64 / self.sent().max(1) as f64
+        1.0 - seen as f64 / self.sent() as f64
     }
 
     /// What was counted in a cell, group by group. A ray to a lane counts for the lanes that lead there.
@@ -93,6 +111,20 @@ impl Counts {
             }
         }
         tallies
+    }
+
+    /// The share of the light that is hidden in a cell, by importance, after what is known was summed up.
+    pub fn hidden_in(&self, cell: usize, known: &[Known]) -> f64 {
+        // The root stands first. What is below it is counted there.
+        let tops = |at: usize, row: &FrontGroup| at == 0 || row.group >= BESIDE;
+        let rows = self.fronts[cell].groups.iter().zip(known).enumerate();
+        let lanes = rows
+            .filter(|(at, (row, _))| tops(*at, row))
+            .flat_map(|(_, (row, known))| row.importances.into_iter().zip(known.shares));
+        let [sum, seen] = lanes.fold([0.0; 2], |[sum, seen], (importance, share)| {
+            [sum + importance, seen + importance * share]
+        });
+        if sum > 0.0 { 1.0 - seen / sum } else { 0.0 }
     }
 
     /// Replaces what is known of lanes whose own group is known by the mean of its lanes.

@@ -12,6 +12,7 @@
 mod counts;
 mod pool;
 
+use crate::emitter::InfiniteLight;
 use crate::light_tree::learned::{Cells, Coordinates, Table, coordinates, divide};
 use crate::light_tree::veil::encode;
 use crate::light_tree::{LightTree, NoSuchFrame, Picked, Receiver, Splitting, Veil};
@@ -106,6 +107,7 @@ pub fn learn<E>(
     }
     let (planes, ranges) = divide(&mut receivers, levels);
     table.planes = planes;
+    table.area = area(&receivers);
     let mut counts: Option<Counts> = None;
     let (mut done, mut hidden) = (0, 0.0);
     for round in 0..ROUNDS {
@@ -119,7 +121,7 @@ pub fn learn<E>(
                     let counts = counts.get_or_insert_with(|| {
                         let of_cell = |&[begin, end]: &[usize; 2]| lookers(&receivers[begin..end]);
                         let lookers: Vec<Vec<Receiver>> = ranges.iter().map(of_cell).collect();
-                        let beside = integrator.infinite.len();
+                        let beside = |receiver: &Receiver| beside(integrator, receiver);
                         Counts::new(integrator.picker.tree(), &lookers, groups, beside)
                     });
                     let seed = hash(hash(SEED, round + 1), frame as u32);
@@ -136,19 +138,19 @@ pub fn learn<E>(
         if round == 0 {
             hidden = counts.hidden();
             if hidden < NOTHING {
-                (table.planes, table.rows) = Default::default();
+                (table.planes, table.rows, table.area) = Default::default();
                 break;
             }
         }
-        table.rows = rows(counts, 1 << levels);
+        (table.rows, table.hidden) = rows(counts, 1 << levels);
     }
     let rays = counts.map_or(0, |counts| counts.sent());
     Ok(Some(Lesson { table, rays, hidden }))
 }
 
-/// The veils that counts give.
-fn rows(counts: &Counts, cells: usize) -> Vec<Veil> {
-    let found: Vec<Mutex<Vec<Veil>>> = (0..cells).map(|_| Mutex::default()).collect();
+/// The veils that counts give, and of each cell the share of the light that is hidden, in parts of 255.
+fn rows(counts: &Counts, cells: usize) -> (Vec<Veil>, Vec<u8>) {
+    let found: Vec<Mutex<(Vec<Veil>, u8)>> = (0..cells).map(|_| Mutex::default()).collect();
     pool(
         (0..cells).into_par_iter().map(|cell| counts.tallies(cell)).collect(),
         &|cell, mut known| {
@@ -158,12 +160,34 @@ fn rows(counts: &Counts, cells: usize) -> Vec<Veil> {
                 Veil { group: known.group, weights }
             };
             let rows = known.iter().map(veil).collect();
-            *found[cell].lock().unwrap_or_else(PoisonError::into_inner) = rows;
+            let hidden = (255.0 * counts.hidden_in(cell, &known)).round() as u8;
+            *found[cell].lock().unwrap_or_else(PoisonError::into_inner) = (rows, hidden);
         },
     );
-    let rows =
-        found.into_iter().map(|rows| rows.into_inner().unwrap_or_else(PoisonError::into_inner));
-    Veil::padded(rows.collect())
+    let found =
+        found.into_iter().map(|cell| cell.into_inner().unwrap_or_else(PoisonError::into_inner));
+    let (rows, hidden) = found.unzip();
+    (Veil::padded(rows), hidden)
+}
+
+/// The box around some receivers.
+fn area(receivers: &[Coordinates]) -> Option<[[f32; 3]; 2]> {
+    let first = receivers.first()?;
+    let place = |&[x, y, z, ..]: &Coordinates| Vec3::new(x, y, z);
+    let [low, high] = receivers
+        .iter()
+        .map(place)
+        .fold([place(first); 2], |[low, high], place| [low.min(place), high.max(place)]);
+    Some([low.to_array(), high.to_array()])
+}
+
+/// The importances of the lights beside the tree for a receiver, in the unit of the tree's.
+fn beside(integrator: &Integrator, receiver: &Receiver) -> Vec<f64> {
+    let importance = |light: &InfiniteLight| match light.forced {
+        true => 0.0,
+        false => light.importance(receiver.normal),
+    };
+    integrator.infinite.iter().map(importance).collect()
 }
 
 /// Receivers that paths of a frame visit.

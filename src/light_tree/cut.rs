@@ -8,12 +8,18 @@
 //! The cut depends on the viewer and the knob alone, not on a random number. So the probability of an
 //! emitter is found by making the same cut again. Infinite lights stand in the cut as clusters that
 //! cannot be opened: they compete with the tree, and with each other, by estimated contribution.
+//!
+//! Where it is known what is [hidden](super::veil), entries of which next to nothing is seen keep a chance, since
+//! nobody can be sure. But they mostly give nothing, so a sample that goes there is missing elsewhere, by chance: noise
+//! that the same scene without the hidden light does not have. So they are *late*: the others get a whole number of
+//! samples, and the late ones get theirs beyond it.
 
 use super::group::WIDTH;
 use super::leaves::{Route, lane_toward};
 use super::place::{Place, Step, Way, Weighed};
 use super::sampling::FrameTree;
 use super::splitting::{Rounded, SplitTest, Splitting, allot};
+use super::veil::Cell;
 use super::viewer::Viewer;
 
 /// What was picked.
@@ -38,6 +44,8 @@ impl Picked {
 /// The part of the relative variance that no opening removes: shadows, textures, whatever no estimate
 /// of the tree accounts for.
 const UNKNOWN: f64 = 0.04;
+/// An entry with a smaller weight is late: a sixteenth of it is seen, or less.
+const LATE: f64 = 0.25;
 
 /// Buffers for a cut and for walks below it, to be reused.
 #[derive(Debug)]
@@ -52,6 +60,11 @@ pub struct Scratch<V> {
     caps: Vec<f64>,
     pub(super) low: Vec<f64>,
     pub(super) high: Vec<f64>,
+    /// Of each entry whether it is late; nothing if none is.
+    pub(super) late: Vec<bool>,
+    /// Of each entry its weight, or 0 if it is late; and its chance if none were late.
+    early: Vec<f64>,
+    shared: Vec<f64>,
     open: Vec<Opened>,
     /// Groups weighed since it was made: what picking costs.
     pub weighed: u64,
@@ -60,8 +73,9 @@ pub struct Scratch<V> {
 impl<V> Default for Scratch<V> {
     fn default() -> Self {
         let (weights, caps, low, high) = Default::default();
-        let (entries, spaces, open) = Default::default();
-        Scratch { entries, spaces, weights, caps, low, high, open, weighed: 0 }
+        let (entries, spaces, late, early, shared, open) = Default::default();
+        let weighed = 0;
+        Scratch { entries, spaces, weights, caps, low, high, late, early, shared, open, weighed }
     }
 }
 
@@ -71,6 +85,7 @@ impl<V> Scratch<V> {
         self.spaces.clear();
         self.weights.clear();
         self.caps.clear();
+        self.late.clear();
         self.open.clear();
     }
 
@@ -78,6 +93,34 @@ impl<V> Scratch<V> {
         self.entries.push(entry);
         self.weights.push(weight);
         self.caps.push(cap);
+    }
+}
+
+impl<V> Scratch<V> {
+    /// Allots about `worth` samples: to each late entry what it would get if none was late, to the others a whole
+    /// number, which is drawn. Late entries have the same chance in either draw. `None` if there are no others, or
+    /// there may be more than `most` samples.
+    fn allot_early(&mut self, worth: f64, most: u32) -> Option<Rounded> {
+        let Scratch { weights, caps, low, high, late, early, shared, .. } = self;
+        early.clear();
+        early.extend(weights.iter().zip(&*late).map(|(&w, &late)| if late { 0.0 } else { w }));
+        early.iter().any(|&weight| weight > 0.0).then_some(())?;
+        allot(weights, caps, worth, shared);
+        let [mut of_early, mut of_late] = [0.0; 2];
+        for (chance, &late) in shared.iter().zip(&*late) {
+            *(if late { &mut of_late } else { &mut of_early }) += chance;
+        }
+        let rounded = Rounded::new(of_early.max(1.0));
+        if f64::from(rounded.low) + 1.0 + of_late.ceil() > f64::from(most) {
+            return None;
+        }
+        for (count, chances) in [(rounded.low, low), (rounded.low + 1, high)] {
+            allot(early, caps, count.into(), chances);
+            for (at, chance) in chances.iter_mut().enumerate().filter(|(at, _)| late[*at]) {
+                *chance = shared[at];
+            }
+        }
+        Some(rounded)
     }
 }
 
@@ -135,8 +178,12 @@ impl FrameTree<'_> {
         scratch: &mut Scratch<V>,
     ) -> Option<Cut> {
         scratch.clear();
+        let knows = !how.is_off() && self.veils.is_some() && viewer.cell() != Cell::NONE;
         for (row, &importance) in (0..).zip(beside) {
             scratch.push(Entry::Light(Picked::Beside(row)), importance, 1.0);
+            if knows {
+                scratch.late.push(self.weight_beside(viewer.cell(), row as usize) < LATE);
+            }
         }
         let (mut variance, mut wanted) = (0.0, None);
         if let Some(place) = self.place_of_root(viewer) {
@@ -154,16 +201,24 @@ impl FrameTree<'_> {
                 }
             }
         }
-        let Scratch { weights, caps, low, high, .. } = scratch;
-        let total: f64 = weights.iter().sum();
+        let total: f64 = scratch.weights.iter().sum();
         if !(total > 0.0 && total.is_finite()) {
             return None;
         }
-        let alive = weights.iter().filter(|&&weight| weight > 0.0).count();
-        let rounded = Rounded::new(how.worth(variance / total + UNKNOWN, alive));
-        allot(weights, caps, rounded.low, low);
+        let alive = scratch.weights.iter().filter(|&&weight| weight > 0.0).count();
+        let worth = how.worth(variance / total + UNKNOWN, alive);
+        if scratch.late.contains(&true)
+            && worth < alive as f64
+            && let Some(rounded) = scratch.allot_early(worth, how.most)
+        {
+            return Some(Cut { rounded, wanted });
+        }
+        scratch.late.clear();
+        let Scratch { weights, caps, low, high, .. } = scratch;
+        let rounded = Rounded::new(worth);
+        allot(weights, caps, rounded.low.into(), low);
         if rounded.chance_of_more > 0.0 {
-            allot(weights, caps, rounded.low + 1, high);
+            allot(weights, caps, (rounded.low + 1).into(), high);
         }
         Some(Cut { rounded, wanted })
     }
@@ -261,6 +316,9 @@ impl FrameTree<'_> {
                     wanted = Some((scratch.entries.len(), leg));
                 }
                 scratch.push(entry, weight, cap);
+                if let Some(veils) = veils {
+                    scratch.late.push(f64::from(veils[lane]) < LATE);
+                }
             }
             // The seed's rule samples all of the cut: there its size is what is capped.
             may_open &= how.test == SplitTest::Variance

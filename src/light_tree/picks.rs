@@ -26,8 +26,8 @@ impl FrameTree<'_> {
         let scratch = &*scratch;
         let (count, u) = cut.rounded.draw(u);
         let chances = cut.chances(scratch, count > cut.rounded.low);
-        let one = count == 1;
-        for (entry, leftover) in comb(chances, u) {
+        let one = count == 1 && scratch.late.is_empty();
+        for (entry, leftover) in comb(chances, &scratch.late, u) {
             let u = if one { leftover } else { another(leftover, salt, entry as u32) };
             if let Some(pick) = self.pick_in(&cut, scratch, entry, chances[entry], u) {
                 visit(pick);

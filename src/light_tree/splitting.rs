@@ -87,16 +87,16 @@ pub(super) const BELOW_ONE: f64 = 1.0 - f64::EPSILON / 2.0;
 /// Allots `count` samples: each cluster gets a chance in proportion to its weight, but not above its
 /// cap, which is at most 1. The chances add up to the count, or to the caps of all weights above zero
 /// if those are less.
-pub(super) fn allot(weights: &[f64], caps: &[f64], count: u32, chances: &mut Vec<f64>) {
+pub(super) fn allot(weights: &[f64], caps: &[f64], count: f64, chances: &mut Vec<f64>) {
     chances.clear();
-    if weights.iter().filter(|&&weight| weight > 0.0).count() <= count as usize {
+    if weights.iter().filter(|&&weight| weight > 0.0).count() as f64 <= count {
         let all = weights.iter().zip(caps);
         chances.extend(all.map(|(&weight, &cap)| if weight > 0.0 { cap } else { 0.0 }));
         return;
     }
     chances.resize(weights.len(), 0.0);
     // Clusters at their caps keep them. The rest of the count goes to the others.
-    let mut left = f64::from(count);
+    let mut left = count;
     loop {
         let alive = || weights.iter().zip(caps).zip(chances.iter());
         let sum: f64 = alive().filter(|((_, cap), chance)| chance < cap).map(|((w, _), _)| w).sum();
@@ -125,14 +125,23 @@ pub(super) fn allot(weights: &[f64], caps: &[f64], count: u32, chances: &mut Vec
 /// meets. This is systematic sampling: neighbours in the tree are neighbours on the line, so the
 /// samples are stratified over the scene. Each cluster comes with a fresh number in `[0, 1)`, stretched
 /// from the first; one that is always taken gets the number itself.
-pub(super) fn comb(chances: &[f64], u: f64) -> impl Iterator<Item = (usize, f64)> + '_ {
+///
+/// Clusters that are `late` are laid behind the others. If what the others have adds up to a whole number, they
+/// are met by as many teeth whatever the first number is, and late clusters by more teeth, now and then.
+pub(super) fn comb<'a>(
+    chances: &'a [f64],
+    late: &'a [bool],
+    u: f64,
+) -> impl Iterator<Item = (usize, f64)> + 'a {
     let mut end = 0.0;
     // The teeth stand at u, u + 1, ...; `next` is the first that no cluster has met. There are no more
     // teeth than the chances add up to, even where rounding would leave room for one.
     let mut next = u;
     let open: f64 = chances.iter().filter(|&&chance| chance < 1.0).sum();
-    let last = u + (open - 1e-9).ceil();
-    chances.iter().enumerate().filter_map(move |(i, &chance)| {
+    // Late clusters may have less than any rounding.
+    let last = u + (open - if late.is_empty() { 1e-9 } else { 0.0 }).ceil();
+    on_the_line(chances.len(), late).filter_map(move |i| {
+        let chance = chances[i];
         if chance <= 0.0 {
             return None;
         }
@@ -148,6 +157,13 @@ pub(super) fn comb(chances: &[f64], u: f64) -> impl Iterator<Item = (usize, f64)
         next += 1.0;
         Some((i, leftover))
     })
+}
+
+/// So many clusters in the order in which they are laid on the line.
+pub(super) fn on_the_line(count: usize, late: &[bool]) -> impl Iterator<Item = usize> + '_ {
+    let is_late = |at: usize| late.get(at).copied().unwrap_or(false);
+    let behind = if late.is_empty() { 0..0 } else { 0..count };
+    (0..count).filter(move |&at| !is_late(at)).chain(behind.filter(move |&at| is_late(at)))
 }
 
 /// A real number of samples, rounded at random to one of its two neighbours.
@@ -193,7 +209,7 @@ mod tests {
             let alive = weights.iter().zip(&caps).filter(|(w, _)| **w > 0.0);
             let most: f64 = alive.map(|(_, cap)| cap).sum();
             let mut chances = Vec::new();
-            allot(&weights, &caps, count, &mut chances);
+            allot(&weights, &caps, count.into(), &mut chances);
             let sum: f64 = chances.iter().sum();
             prop_assert!((sum - f64::from(count).min(most)).abs() < 1e-9, "{sum}");
             for ((chance, weight), cap) in chances.iter().zip(weights).zip(caps) {
@@ -205,15 +221,17 @@ mod tests {
         /// clusters than the count.
         #[test]
         fn clusters_are_taken_as_often_as_their_chance(
-            (weights, caps) in clusters(), count in 1u32..50
+            (weights, caps) in clusters(), count in 1u32..50,
+            late in prop::collection::vec(any::<bool>(), 40), has_late in any::<bool>()
         ) {
             const DRAWS: u32 = 2048;
             let mut chances = Vec::new();
-            allot(&weights, &caps, count, &mut chances);
+            allot(&weights, &caps, count.into(), &mut chances);
+            let late = if has_late { &late[..chances.len()] } else { &[] };
             let mut taken = vec![0u32; weights.len()];
             for i in 0..DRAWS {
                 let u = (f64::from(i) + 0.5) / f64::from(DRAWS);
-                let found: Vec<_> = comb(&chances, u).collect();
+                let found: Vec<_> = comb(&chances, late, u).collect();
                 prop_assert!(found.len() as u32 <= count);
                 for (at, leftover) in found {
                     taken[at] += 1;
@@ -223,6 +241,29 @@ mod tests {
             for (taken, chance) in taken.iter().zip(chances) {
                 prop_assert!((f64::from(*taken) - chance * f64::from(DRAWS)).abs() <= 2.0 + 1e-6);
             }
+        }
+
+        /// Whatever the late ones have, the others are as many for every number.
+        #[test]
+        fn late_clusters_leave_the_number_of_the_others(
+            (weights, _) in clusters(), count in 1u32..20, late in prop::collection::vec(0.0..1f64, 1..5)
+        ) {
+            let caps = vec![1.0; weights.len()];
+            let mut chances = Vec::new();
+            allot(&weights, &caps, count.into(), &mut chances);
+            let early = chances.len();
+            let count = weights.iter().filter(|weight| **weight > 0.0).count().min(count as usize);
+            chances.extend(&late);
+            let is_late: Vec<bool> = (0..chances.len()).map(|at| at >= early).collect();
+            let behind: f64 = late.iter().sum();
+            let mut met = 0;
+            for i in 0..1024 {
+                let u = (f64::from(i) + 0.5) / 1024.0;
+                let found: Vec<_> = comb(&chances, &is_late, u).collect();
+                prop_assert_eq!(found.iter().filter(|(at, _)| *at < early).count(), count);
+                met += found.len() - count;
+            }
+            prop_assert!((met as f64 / 1024.0 - behind).abs() < 5e-3, "{met} of {behind}");
         }
 
         #[test]

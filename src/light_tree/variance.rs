@@ -11,7 +11,7 @@ use super::cut::{Entry, Picked, Scratch};
 use super::group::WIDTH;
 use super::place::{Choice, Next, Place};
 use super::sampling::FrameTree;
-use super::splitting::{Splitting, comb};
+use super::splitting::{Splitting, comb, on_the_line};
 use super::viewer::Viewer;
 
 /// Mean and variance of an estimator.
@@ -63,7 +63,11 @@ impl FrameTree<'_> {
                 let divisor = cut.divisor(&scratch, entry, chances[entry]);
                 (mean / divisor, variance / (divisor * divisor))
             };
-            of_comb(chances, &of_entry.iter().enumerate().map(scaled).collect::<Vec<_>>())
+            of_comb(
+                chances,
+                &scratch.late,
+                &of_entry.iter().enumerate().map(scaled).collect::<Vec<_>>(),
+            )
         };
         let low = of_draw(false);
         let high = if share > 0.0 { of_draw(true) } else { low };
@@ -139,7 +143,7 @@ impl<V> Level<'_, V> {
 }
 
 /// Mean and variance of the sum over the entries that a comb takes, given those of each entry.
-fn of_comb(chances: &[f64], of_entry: &[(f64, f64)]) -> (f64, f64) {
+fn of_comb(chances: &[f64], late: &[bool], of_entry: &[(f64, f64)]) -> (f64, f64) {
     let alive = || chances.iter().zip(of_entry).filter(|(chance, _)| **chance > 0.0);
     let mean: f64 = alive().map(|(chance, (mean, _))| chance * mean).sum();
     let within: f64 = alive().map(|(chance, (_, variance))| chance * variance).sum();
@@ -147,10 +151,11 @@ fn of_comb(chances: &[f64], of_entry: &[(f64, f64)]) -> (f64, f64) {
     let is_open = |chance: f64| chance > 0.0 && chance < 1.0;
     let (mut end, mut expected) = (0.0, 0.0);
     let mut steps = vec![1.0];
-    for (&chance, (mean, _)) in chances.iter().zip(of_entry) {
+    for at in on_the_line(chances.len(), late) {
+        let chance = chances[at];
         if is_open(chance) {
             end += chance;
-            expected += chance * mean;
+            expected += chance * of_entry[at].0;
             steps.push(f64::fract(end));
         }
     }
@@ -158,8 +163,8 @@ fn of_comb(chances: &[f64], of_entry: &[(f64, f64)]) -> (f64, f64) {
     let (mut from, mut between) = (0.0, 0.0);
     for to in steps {
         if to > from {
-            let taken =
-                comb(chances, 0.5 * (from + to)).filter(|&(entry, _)| is_open(chances[entry]));
+            let taken = comb(chances, late, 0.5 * (from + to))
+                .filter(|&(entry, _)| is_open(chances[entry]));
             let sum: f64 = taken.map(|(entry, _)| of_entry[entry].0).sum();
             between += (to - from) * (sum - expected).powi(2);
             from = to;

@@ -39,17 +39,23 @@ pub enum Scale {
         /// What it is counted in.
         unit: String,
     },
+    /// From lamplight at 0 to night at 1: a share that is dark.
+    Shadow,
 }
 
 /// The ends and the middle of a gain's colours.
 const LOSS: [f32; 3] = [20.0, 110.0, 220.0];
 const NONE: [f32; 3] = [128.0, 128.0, 130.0];
 const GAIN: [f32; 3] = [255.0, 140.0, 0.0];
+/// The ends of a shadow's colours.
+const LIT: [f32; 3] = [255.0, 226.0, 140.0];
+const DARK: [f32; 3] = [38.0, 30.0, 92.0];
 /// Pixels of a key.
 const KEY: u32 = 128;
 
 impl Scale {
-    fn color(&self, value: f32) -> Rgba<u8> {
+    /// The colour of a number; clear, if it is none.
+    pub(super) fn color(&self, value: f32) -> Rgba<u8> {
         if value.is_nan() {
             return Rgba([0; 4]);
         }
@@ -65,6 +71,10 @@ impl Scale {
                 let end = if share < 0.0 { LOSS } else { GAIN };
                 std::array::from_fn(|i| NONE[i] + share.abs() * (end[i] - NONE[i]))
             }
+            Scale::Shadow => {
+                let share = value.clamp(0.0, 1.0);
+                std::array::from_fn(|i| LIT[i] + share * (DARK[i] - LIT[i]))
+            }
         };
         Rgba([r.round() as u8, g.round() as u8, b.round() as u8, 255])
     }
@@ -74,7 +84,23 @@ impl Scale {
         match *self {
             Scale::Grey { white } | Scale::Heat { white } => [0.0, white],
             Scale::Gain { limit, .. } => [-limit, limit],
+            Scale::Shadow => [0.0, 1.0],
         }
+    }
+
+    /// A strip of the colours between both ends.
+    fn strip(&self) -> Raster {
+        let [low, high] = self.ends();
+        Raster(RgbaImage::from_fn(KEY, 1, |x, _| {
+            self.color(low + (high - low) * (x as f32 + 0.5) / KEY as f32)
+        }))
+    }
+
+    /// The key to the colours, as HTML.
+    pub(super) fn key(&self) -> String {
+        let [from, to] = self.words();
+        let (from, to, strip) = (Escaped(&from), Escaped(&to), self.strip());
+        format!("<span class=\"key\">{from}<img src=\"{strip}\" alt=\"to\">{to}</span>")
     }
 
     /// What stands at both ends of the key.
@@ -82,6 +108,7 @@ impl Scale {
         match self {
             Scale::Grey { white } | Scale::Heat { white } => ["0".into(), format!("{white:.3}")],
             Scale::Gain { limit, unit } => [format!("-{limit} {unit}"), format!("+{limit} {unit}")],
+            Scale::Shadow => ["nothing hidden".into(), "everything".into()],
         }
     }
 }
@@ -94,19 +121,11 @@ impl Display for HeatMap {
         let pixels = RgbaImage::from_fn(self.width, height, |x, y| {
             self.scale.color(self.values[(y * self.width + x) as usize])
         });
-        let [low, high] = self.scale.ends();
-        let key = RgbaImage::from_fn(KEY, 1, |x, _| {
-            self.scale.color(low + (high - low) * (x as f32 + 0.5) / KEY as f32)
-        });
-        let caption = Escaped(&self.caption);
-        let [from, to] = self.scale.words();
-        let (from, to) = (Escaped(&from), Escaped(&to));
-        let (pixels, key) = (Raster(pixels), Raster(key));
+        let (caption, key, pixels) = (Escaped(&self.caption), self.scale.key(), Raster(pixels));
         writeln!(
             f,
             "<figure class=\"heat\"><img src=\"{pixels}\" alt=\"{caption}\">\n\
-             <figcaption>{caption}<span class=\"key\">{from}<img src=\"{key}\" alt=\"to\">{to}</span>\
-             </figcaption></figure>"
+             <figcaption>{caption}{key}</figcaption></figure>"
         )
     }
 }
@@ -121,6 +140,8 @@ mod tests {
         let [low, none, high] = [-9.0, 0.0, f32::INFINITY].map(|value| gain.color(value).0);
         assert!(low[2] > low[0] && high[0] > high[2] && none[0].abs_diff(none[2]) < 9);
         assert_eq!(gain.color(f32::NAN).0[3], 0);
+        let [lit, dark] = [0.0, 1.0].map(|value| Scale::Shadow.color(value).0);
+        assert!(lit[..3].iter().zip(&dark[..3]).all(|(lit, dark)| lit > dark));
         let grey = Scale::Grey { white: 4.0 };
         let shown = [0.0, 1.0, 4.0, 5.0].map(|value| grey.color(value).0[0]);
         assert_eq!(shown, [0, 128, 255, 255]);

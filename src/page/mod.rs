@@ -14,6 +14,7 @@
 //! | `plan` | a [`Plan`]: marks in space, from above and from the front |
 //! | `view`, `axes` | one way of looking at it, and the ticks around it |
 //! | `shade` | marks too many to be drawn, as a ground of density |
+//! | `ground` | numbers of many boxes above each other, as a ground of colours |
 //! | `chart` | a [`Chart`]: curves over logarithmic axes |
 //! | `heat` | a [`HeatMap`]: numbers on a grid as colours |
 //! | `wipe` | a [`Wipe`]: pictures of one thing, two of them under a slider |
@@ -23,6 +24,7 @@
 mod axes;
 mod chart;
 mod escape;
+mod ground;
 mod heat;
 mod number;
 mod plain;

@@ -3,9 +3,10 @@
 //! runs across the page.
 
 use super::escape::Escaped;
+use super::ground::Ground;
 use super::shade::Shade;
-use super::view::{LEFT, View, WIDTH, views};
-use super::{Ink, Part};
+use super::view::{View, WIDTH, views};
+use super::{Ink, Part, Scale};
 use glam::Vec3;
 use std::fmt::{self, Display};
 
@@ -56,14 +57,13 @@ pub struct Plan {
     caption: String,
     views: [View; 2],
     shades: Option<[Shade; 2]>,
+    grounds: Option<([Ground; 2], Scale)>,
 }
 
 /// Radius of the heaviest mark, and of the lightest.
 const RADII: [f64; 2] = [11.0, 1.4];
 /// The share of a picture that marks cover, at most; marks of the smallest radius may exceed it.
 const COVERED: f64 = 0.08;
-/// Side of a cell of the ground.
-const CELL: f64 = 2.0;
 
 impl Plan {
     /// An empty picture of what a box holds.
@@ -76,14 +76,25 @@ impl Plan {
             caption: caption.into(),
             views: views(around),
             shades: None,
+            grounds: None,
+        }
+    }
+
+    /// Adds a box with a number, which its colour tells, below everything. Where boxes lie above each other, the
+    /// colour is that of their mean. The scale that is given first counts.
+    pub fn paint(&mut self, cuboid: &Cuboid, value: f64, scale: &Scale) {
+        let views = self.views;
+        let new = || (views.map(|view| view.cells(Ground::new)), scale.clone());
+        let (grounds, _) = self.grounds.get_or_insert_with(new);
+        for (ground, view) in grounds.iter_mut().zip(views) {
+            ground.add(view.share(cuboid.min), view.share(cuboid.max), value);
         }
     }
 
     /// Adds to the density that is drawn below everything.
     pub fn shade(&mut self, at: Vec3, weight: f64) {
         let views = self.views;
-        let cells = |length: f64| (length / CELL).ceil().max(1.0) as u32;
-        let new = || views.map(|view| Shade::new(cells(View::WIDTH), cells(view.height)));
+        let new = || views.map(|view| view.cells(Shade::new));
         for (shade, view) in self.shades.get_or_insert_with(new).iter_mut().zip(views) {
             shade.add(view.share(at), weight);
         }
@@ -121,14 +132,10 @@ impl Display for Plan {
         let per_root = self.radius_per_root();
         for (number, view) in self.views.iter().enumerate() {
             view.write_axes(f)?;
-            if let Some(shades) = &self.shades {
-                let (raster, width) = (shades[number].raster(), View::WIDTH);
-                writeln!(
-                    f,
-                    "<image href=\"{raster}\" x=\"{LEFT}\" y=\"{:.1}\" width=\"{width}\" \
-                     height=\"{:.1}\" preserveAspectRatio=\"none\"/>",
-                    view.top, view.height
-                )?;
+            let ground = self.grounds.as_ref().map(|(of, scale)| of[number].raster(scale));
+            let shade = self.shades.as_ref().map(|of| of[number].raster());
+            for raster in [ground, shade].into_iter().flatten() {
+                view.write_image(f, &raster)?;
             }
             for (row, level) in self.levels.iter().enumerate() {
                 let hidden = if row == self.shown { "" } else { " hidden" };
@@ -157,6 +164,9 @@ impl Display for Plan {
         for (ink, name) in &self.kinds {
             let (class, name) = (ink.class(), Escaped(name));
             writeln!(f, "<span class=\"key\"><i class=\"{class}\"></i>{name}</span>")?;
+        }
+        if let Some((_, scale)) = &self.grounds {
+            f.write_str(&scale.key())?;
         }
         if let Some(last) = self.levels.len().checked_sub(1) {
             let shown = self.shown;

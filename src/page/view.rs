@@ -2,18 +2,21 @@
 
 use super::axes::ticks;
 use super::plan::Cuboid;
+use super::raster::Raster;
 use glam::Vec3;
 use std::fmt;
 
 /// Sides of the picture, in units of the drawing: pixels, if there is room.
 pub const WIDTH: f64 = 960.0;
-pub const LEFT: f64 = 56.0;
+const LEFT: f64 = 56.0;
 const RIGHT: f64 = 8.0;
 const ABOVE: f64 = 26.0;
 const BELOW: f64 = 22.0;
 /// The largest heights of the plan and of the elevation.
 const HEIGHTS: [f64; 2] = [520.0, 300.0];
 const LEAST_HEIGHT: f64 = 60.0;
+/// Side of a cell of the ground.
+const CELL: f64 = 2.0;
 
 /// One way of looking at a box.
 #[derive(Clone, Copy, Debug)]
@@ -74,6 +77,24 @@ impl View {
     pub fn share(&self, p: Vec3) -> [f64; 2] {
         let [x, y] = self.at(p);
         [(x - LEFT) / View::WIDTH, (y - self.top) / self.height]
+    }
+
+    /// A ground of so many columns and rows that its cells can just be seen.
+    pub fn cells<T>(&self, new: impl Fn(u32, u32) -> T) -> T {
+        let cells = |length: f64| (length / CELL).ceil().max(1.0) as u32;
+        new(cells(View::WIDTH), cells(self.height))
+    }
+
+    /// An image that fills the view.
+    pub fn write_image(&self, f: &mut fmt::Formatter, image: &Raster) -> fmt::Result {
+        writeln!(
+            f,
+            "<image href=\"{image}\" x=\"{LEFT}\" y=\"{:.1}\" width=\"{}\" height=\"{:.1}\" \
+             preserveAspectRatio=\"none\"/>",
+            self.top,
+            View::WIDTH,
+            self.height
+        )
     }
 
     /// Where the drawing ends if there is nothing below.

@@ -1,10 +1,11 @@
 //! The job of `candelabra learn`: a scene and its tree in, a table of what is seen out.
 
-use super::learned::{LearnedError, open_learned, view_key};
+use super::learn_budget::{Budget, Trials};
+use super::learned::{LearnedError, open_learned};
 use super::read::read_scene;
 use super::{
     ASPECT, Event, ReadError, Strict, TreeChoice, TreeError, View, ViewError, Watch, frames_of,
-    look, option, with_trees,
+    look, option, view_keys, with_trees,
 };
 use crate::learn::{LearnOptions, Lesson, learn};
 use crate::light_tree::NoSuchFrame;
@@ -35,8 +36,8 @@ pub struct LearnJob {
     pub view: View,
     /// The table to write.
     pub output: PathBuf,
-    /// Rays to lights.
-    pub rays: u64,
+    /// How much to learn.
+    pub budget: Budget,
     /// Paths at and below which lights are forced.
     pub force_lights: Vec<String>,
     /// The notes that are errors.
@@ -48,7 +49,9 @@ pub struct LearnJob {
 pub struct LearnReport {
     /// Frames that were looked at.
     pub frames: usize,
-    /// Rays to lights.
+    /// Rays to lights that were asked for, or that the time allowed: the same number gives the same table.
+    pub budget: u64,
+    /// Rays to lights that were counted.
     pub rays: u64,
     /// The share of a render's picks that would not have arrived.
     pub hidden: f64,
@@ -56,7 +59,7 @@ pub struct LearnReport {
     pub cells: usize,
     /// Length of the file.
     pub bytes: usize,
-    /// The time that learning took.
+    /// The time that learning took, without what was learned to know how long it takes.
     pub learning: Duration,
 }
 
@@ -90,14 +93,12 @@ pub enum LearnError {
 }
 
 impl LearnJob {
-    /// Rays that pay for themselves in one frame of final quality.
-    pub const RAYS: u64 = 1 << 22;
-
     /// Learns, and writes the table.
     ///
     /// # Errors
     /// If the scene, its tree or the output cannot be used, or the job is stopped.
     pub fn run(&self, watch: &dyn Watch) -> Result<LearnReport, LearnError> {
+        let started = Instant::now();
         sweep(folder_of(&self.output));
         check_writable(&self.output)?;
         if let Err(LearnedError::NoTable(path)) = open_learned(&self.output, false) {
@@ -116,36 +117,58 @@ impl LearnJob {
         stage("looking at the light tree");
         let choice =
             TreeChoice { file: self.tree.clone(), forced: self.force_lights.clone(), verify: true };
-        let (lesson, learning) = with_trees(&scene, &choice, &|_, _| (), |emitters, mut trees| {
-            stage("preparing rays");
-            let delegate = RenderDelegate::new(&scene, emitters, camera.clone(), settings);
-            stage("learning what is seen");
-            let started = Instant::now();
-            let lesson = learn::<LearnError>(
-                &delegate,
-                &frames,
-                |frame, work| Ok(work(&trees.for_frame(frame)?)?),
-                &LearnOptions::of_rays(self.rays),
-                &mut |done| {
-                    watch.tell(Event::Progress { done, frame: None });
-                    !watch.is_stopped()
-                },
-            )?;
-            trees.check_unwritten()?;
-            Ok::<_, LearnError>((lesson.ok_or(LearnError::Stopped)?, started.elapsed()))
-        })?;
+        let (lesson, budget, learning) =
+            with_trees(&scene, &choice, &|_, _| (), |emitters, mut trees| {
+                stage("preparing rays");
+                let delegate = RenderDelegate::new(&scene, emitters, camera.clone(), settings);
+                let mut lesson = |rays: u64, tell: &dyn Fn(f64)| {
+                    let started = Instant::now();
+                    let lesson = learn::<LearnError>(
+                        &delegate,
+                        &frames,
+                        |frame, work| Ok(work(&trees.for_frame(frame)?)?),
+                        &LearnOptions::of_rays(rays),
+                        &mut |done| {
+                            tell(done);
+                            !watch.is_stopped()
+                        },
+                    )?;
+                    Ok::<_, LearnError>((lesson.ok_or(LearnError::Stopped)?, started.elapsed()))
+                };
+                let rays = match self.budget {
+                    Budget::Rays(rays) => rays,
+                    Budget::Seconds(seconds) => {
+                        stage("finding out how long rays take");
+                        let left = || seconds - started.elapsed().as_secs_f64();
+                        let mut trials = Trials::default();
+                        while let Some(rays) = trials.next(left()) {
+                            let (lesson, took) = lesson(rays, &|_| ())?;
+                            let is_whole = lesson.table.view().is_some();
+                            trials
+                                .add(if is_whole { rays } else { lesson.rays }, took.as_secs_f64());
+                        }
+                        trials.fitting(left())
+                    }
+                };
+                stage("learning what is seen");
+                let tell = |done| watch.tell(Event::Progress { done, frame: None });
+                let (lesson, learning) = lesson(rays, &tell)?;
+                trees.check_unwritten()?;
+                Ok::<_, LearnError>((lesson, rays, learning))
+            })?;
         let Lesson { table, rays, hidden } = lesson;
         let meta = json!({
             "program": concat!("candelabra ", env!("CARGO_PKG_VERSION")),
-            "frames": frames, "rays": rays, "hidden": (hidden * 1e4).round() / 1e4,
+            "frames": frames, "budget": budget, "rays": rays, "hidden": (hidden * 1e4).round() / 1e4,
         });
-        let bytes = table.to_bytes(view_key(&scene, &camera), &meta.to_string());
+        let bytes = table.to_bytes(view_keys(&scene, &camera), &meta.to_string());
         let sound = LearnedFile::open(bytes).and_then(|file| file.verify().map(|()| file));
         let file = sound.map_err(LearnError::Unsound)?;
         write_atomically(&self.output, |out| out.write_all(file.data().as_ref()))?;
         let cells = file.view().map_or(0, |learned| learned.cells.count());
         let bytes = file.byte_length();
-        Ok(LearnReport { frames: frames.len(), rays, hidden, cells, bytes, learning })
+        let frames = frames.len();
+        Ok(LearnReport { frames, budget, rays, hidden, cells, bytes, learning })
     }
 }
 

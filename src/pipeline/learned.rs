@@ -1,10 +1,8 @@
 //! Opening a table of what is seen, and telling what it is worth for a shot.
 
-use super::content::scene_fingerprint;
-use super::stamp::place_of;
-use crate::light_tree::learned::LearnedFile;
-use crate::scene::{Camera, Scene};
+use crate::light_tree::learned::{LearnedFile, ViewKeys};
 use crate::store::{MappedFile, StoreError};
+use serde::Serialize;
 use std::path::{Path, PathBuf};
 
 /// A table over a mapped file.
@@ -63,12 +61,47 @@ pub fn open_learned(path: &Path, verify: bool) -> Result<OpenedTable, LearnedErr
     Ok(file)
 }
 
-/// BLAKE3 over what a table is learned from, beside the tree: the scene's files and the camera.
-pub fn view_key(scene: &Scene, camera: &Camera) -> [u8; 32] {
-    let mut hasher = blake3::Hasher::new();
-    hasher.update(&scene_fingerprint(scene));
-    hasher.update(format!("{camera:?} {:?}", place_of(scene, camera)).as_bytes());
-    *hasher.finalize().as_bytes()
+/// Something that a table was learned from and that is not what it was.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Outdated {
+    /// Lights that stand still: weights are told of the groups of their tree, so the table is not used.
+    Lights,
+    /// Suns and domes.
+    LightsAtInfinity,
+    /// What rays can meet.
+    Geometry,
+    /// The camera.
+    Camera,
+}
+
+impl Outdated {
+    /// Its name in a sentence.
+    pub fn name(self) -> &'static str {
+        match self {
+            Outdated::Lights => "lights",
+            Outdated::LightsAtInfinity => "lights at infinity",
+            Outdated::Geometry => "geometry",
+            Outdated::Camera => "camera",
+        }
+    }
+}
+
+/// What of a shot is not what a table was learned from; nothing if it is up to date. `tree` is the
+/// [key](crate::light_tree::LightTree::still_key) of the tree.
+pub fn outdated(
+    table: &LearnedFile<impl AsRef<[u8]>>,
+    tree: [u8; 32],
+    view: &ViewKeys,
+) -> Vec<Outdated> {
+    let was = table.view_keys();
+    let differs = [
+        (table.tree_key() != tree, Outdated::Lights),
+        (was.infinite != view.infinite, Outdated::LightsAtInfinity),
+        (was.geometry != view.geometry, Outdated::Geometry),
+        (was.camera != view.camera, Outdated::Camera),
+    ];
+    differs.into_iter().filter_map(|(differs, what)| differs.then_some(what)).collect()
 }
 
 /// What there is to say of a table before a shot is rendered by it; nothing if it is of this shot. `tree` is
@@ -77,18 +110,21 @@ pub fn caveat(
     table: &LearnedFile<impl AsRef<[u8]>>,
     path: &Path,
     tree: [u8; 32],
-    view: [u8; 32],
+    view: &ViewKeys,
 ) -> Option<String> {
     let path = path.display();
-    if table.tree_key() != tree {
+    let outdated = outdated(table, tree, view);
+    if outdated.contains(&Outdated::Lights) {
         return Some(format!(
             "{path}: not used: it was learned with other lights; learn again with `candelabra learn`"
         ));
     }
-    (table.view_key() != view).then(|| {
+    let names: Vec<&str> = outdated.iter().map(|what| what.name()).collect();
+    (!names.is_empty()).then(|| {
         format!(
-            "{path}: learned from another version of the scene or through another camera: the picture is right, \
-             but may be noisier than it has to be; `candelabra learn` renews it"
+            "{path}: out of date ({}): the picture is right, but may be noisier than it has to be; \
+             `candelabra learn` renews it",
+            names.join(", ")
         )
     })
 }

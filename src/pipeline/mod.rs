@@ -11,7 +11,7 @@
 //! | [`build_tree`], [`rebuild_tree`] | the trees of a shot, anew or upon an earlier file |
 //! | [`ShotTrees`] | the trees of one frame after the other: from a file, or built |
 //! | [`check_fresh`], [`standing`] | does a whole file still belong to the scene; if not, which lights changed? |
-//! | [`open_learned`], [`caveat`] | what is hidden from where; does that still belong to the shot? |
+//! | [`open_learned`], [`outdated`], [`caveat`] | what is hidden from where; does that still belong to the shot? |
 //! | [`Stamp`] | what was a picture rendered from? |
 
 mod agreement;
@@ -24,6 +24,7 @@ mod fit;
 mod forced;
 mod frames;
 mod fresh;
+mod learn_budget;
 mod learn_job;
 mod learned;
 mod look;
@@ -38,6 +39,7 @@ mod survey;
 mod surveyor;
 mod textures;
 mod view;
+mod view_keys;
 mod watch;
 
 pub use agreement::{Contradiction, Standing, standing};
@@ -51,8 +53,11 @@ pub use fresh::{
     OpenedTree, StaleTree, TreeError, check_agreement, check_fresh, check_output, is_tree_file,
     open_base, open_tree,
 };
+pub use learn_budget::Budget;
 pub use learn_job::{LearnError, LearnJob, LearnReport};
-pub use learned::{LearnedError, OpenedTable, caveat, is_table_file, open_learned, view_key};
+pub use learned::{
+    LearnedError, OpenedTable, Outdated, caveat, is_table_file, open_learned, outdated,
+};
 pub use read::ReadError;
 pub use render_job::{
     Audit, Effort, FrameCounts, FrameNoise, Plan, Preview, Quality, RenderError, RenderJob,
@@ -65,6 +70,7 @@ pub use strict::{Strict, StrictError};
 pub use survey::{Group, PlacedLight, SharedBounds, Survey, SurveyedFrame, survey};
 pub use textures::collect_emitters;
 pub use view::{ASPECT, Look, View, ViewError, look};
+pub use view_keys::view_keys;
 pub use watch::{Event, Watch};
 
 use crate::ingest::{self, IngestError};

@@ -143,7 +143,7 @@ impl Stamper {
 }
 
 /// The camera's node, and all above it.
-pub(super) fn place_of<'a>(scene: &'a Scene, camera: &Camera) -> Vec<&'a Node> {
+fn place_of<'a>(scene: &'a Scene, camera: &Camera) -> Vec<&'a Node> {
     let node = |number: u32| &scene.nodes[number as usize];
     let above = |node_: &&'a Node| node_.parent.map(node);
     std::iter::successors(Some(node(camera.node)), above).collect()

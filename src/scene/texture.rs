@@ -65,6 +65,15 @@ impl TextureUse {
 }
 
 impl Texture {
+    /// The opacity of each texel, 255 for all of it, row after row; nothing if it has no alpha.
+    pub fn opacities(&self) -> impl Iterator<Item = u8> + '_ {
+        let texels: &[[u8; 4]] = match &self.pixels {
+            Pixels::Srgb8(texels) | Pixels::Linear8(texels) => texels,
+            Pixels::Float(_) => &[],
+        };
+        texels.iter().map(|&[_, _, _, opacity]| opacity)
+    }
+
     /// The bytes of the image as it is stored.
     pub fn bytes(&self) -> &[u8] {
         match &self.pixels {

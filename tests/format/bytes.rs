@@ -8,6 +8,7 @@ const ROW: usize = 32;
 /// The sections of a file, under checksums that will be right.
 #[derive(Clone)]
 pub struct Parts {
+    pub magic: [u8; 8],
     pub version: [u16; 2],
     pub fingerprint: [u8; 32],
     pub sections: Vec<Section>,
@@ -40,7 +41,8 @@ impl Parts {
             bytes: file[usize_at(row, 8)..][..usize_at(row, 16)].to_vec(),
         };
         let fingerprint = file[32..HEADER].try_into().unwrap();
-        Parts { version: [1, 0], fingerprint, sections: rows.map(section).collect() }
+        let magic = file[..8].try_into().unwrap();
+        Parts { magic, version: [1, 0], fingerprint, sections: rows.map(section).collect() }
     }
 
     /// A section's bytes.
@@ -63,7 +65,7 @@ impl Parts {
     pub fn file(&self) -> AlignedBytes {
         let table_end = HEADER + ROW * self.sections.len();
         let mut file = vec![0; table_end];
-        file[..8].copy_from_slice(b"\x89LTR\r\n\x1a\n");
+        file[..8].copy_from_slice(&self.magic);
         file[8..10].copy_from_slice(&self.version[0].to_le_bytes());
         file[10..12].copy_from_slice(&self.version[1].to_le_bytes());
         file[12..16].copy_from_slice(&0x0102_0304_u32.to_le_bytes());

@@ -66,6 +66,7 @@ fn laws_hold<V: Viewer>(
         let u = (f64::from(i) + 0.5) / 32.0;
         let mut picks = Vec::new();
         tree.for_each_pick(&veiled, beside, how, (u, i), &mut scratch, |pick| picks.push(pick));
+        prop_assert!(picks.len() <= how.most as usize, "{} picks", picks.len());
         for pick in picks {
             let told = tree.expected(&veiled, beside, how, pick.light, &mut fresh);
             prop_assert!((pick.expected - told).abs() <= 1e-12 * told, "{pick:?} but {told}");
@@ -138,23 +139,39 @@ proptest! {
         }
     }
 
-    /// A table that knows nothing right: each group that it weighs makes a light at most so much less
-    /// likely as its smallest weight says.
+    /// A table that knows nothing right, as of other geometry: on the way to a light, each group that it weighs
+    /// makes the light at most so much less likely as the lane's weight is below the largest of the group. So
+    /// no light is rarer than that, and no second moment is larger than by the worst of it.
     #[test]
     fn the_worst_table_costs_no_more_than_its_smallest_weight_tells(
-        bounds in emitters(100), viewer in receiver(), rows in rows()
+        bounds in emitters(100), viewer in receiver(), rows in rows(),
+        contributions in prop::collection::vec(-3.0..3f64, 100)
     ) {
         let tree = tree_over(&bounds);
         let plain = tree.at_frame(0).unwrap();
-        let rows: Vec<Veil> = rows.into_iter().take(1).collect();
-        let least = rows[0].weights.map(decode).into_iter().fold(1.0, f32::min);
         let veiled = plain.clone().veiled(Veils::new(1, &rows));
         let there = Veiled { viewer, cell: Cell(0) };
+        let mut worst = 1f64;
         for emitter in 0..bounds.len() as u32 {
+            let mut least = 1f64;
+            plain.for_each_lane_toward(emitter, |group, lane| {
+                if let Some(row) = rows.iter().find(|row| row.group == group) {
+                    let weights = row.weights.map(|byte| f64::from(decode(byte)));
+                    least *= weights[lane] / weights.into_iter().fold(0.0, f64::max);
+                }
+            });
             let without = plain.probability(&viewer, emitter);
             let with = veiled.probability(&there, emitter);
-            prop_assert!(with >= without * f64::from(least) * (1.0 - 1e-9), "{with} of {without}");
+            prop_assert!(with >= without * least * (1.0 - 1e-9), "{with} of {without}");
+            worst = worst.min(least);
         }
+        let of = |light: Picked, _| {
+            light.emitter().map_or(0.0, |emitter| 10f64.powf(contributions[emitter as usize]))
+        };
+        let second = |m: Moments| m.variance + m.mean * m.mean;
+        let without = second(plain.moments(&viewer, &[], &Splitting::NONE, &of));
+        let with = second(veiled.moments(&there, &[], &Splitting::NONE, &of));
+        prop_assert!(with <= without / worst * (1.0 + 1e-9), "{with} of {without}, {worst}");
     }
 
     /// Whatever planes are, each receiver has a cell; sharp planes divide receivers as they were divided.
@@ -203,4 +220,35 @@ proptest! {
 fn full_view_is_a_weight_of_one() {
     assert_eq!((decode(255), encode(1.0), encode(0.0)), (1.0, 255, 0));
     assert!(Table::default().view().is_none());
+}
+
+/// A light of which next to nothing is seen keeps a chance, and what it takes is missing nowhere else: twenty lights
+/// that are weighed exactly have no noise with it, as they have none without it.
+#[test]
+fn a_hidden_light_brings_no_noise_to_the_others() {
+    let tree = tree_over(&[]);
+    let hidden = 20;
+    let mut rows: Vec<Veil> =
+        (0..3).map(|row| Veil { group: BESIDE + row, weights: [255; WIDTH] }).collect();
+    rows[hidden / WIDTH].weights[hidden % WIDTH] = 12;
+    let frame = tree.at_frame(0).unwrap().veiled(Veils::new(1, &rows));
+    let viewer = Veiled { viewer: Receiver { point: Vec3::ZERO, normal: Vec3::Y }, cell: Cell(0) };
+    let variance = |brighter: f64, cell: Cell, knob: f32| {
+        let mut beside = vec![1.0; hidden];
+        let weight = frame.weight_beside(cell, hidden);
+        beside.push(brighter * weight);
+        let of = |light: Picked, _| f64::from(u8::from(light != Picked::Beside(hidden as u32)));
+        let how = Splitting { knob, ..Splitting::NONE };
+        let moments = frame.moments(&Veiled { cell, ..viewer }, &beside, &how, &of);
+        assert!((moments.mean - hidden as f64).abs() < 1e-9, "{moments:?}");
+        moments.variance / moments.mean.powi(2)
+    };
+    for knob in [0.2, 0.3, 0.5, 0.7] {
+        for brighter in [1.0, 30.0, 1e3, 1e4, 1e6] {
+            let told = variance(brighter, Cell(0), knob);
+            assert!(told < 1e-12, "knob {knob}, {brighter} times as bright: {told}");
+        }
+        // Whether it is known that it is hidden does matter.
+        assert!(variance(0.7, Cell::NONE, knob) > 1e-3, "knob {knob}");
+    }
 }

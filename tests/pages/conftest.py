@@ -98,6 +98,20 @@ def inspect_page(candelabra, scenes, folder) -> Path:
 
 
 @pytest.fixture(scope="session")
+def table_page(candelabra, folder) -> Path:
+    """What is hidden below a roof that hangs over the middle of the floor."""
+    scene, table, page = folder / "roofed.gltf", folder / "roofed.lvis", folder / "table.html"
+    content = _scene({f"lamp_{i}": {"at": [i - 4, 3, 0], "intensity": 9} for i in range(9)})
+    content["nodes"].append({"name": "roof", "mesh": 0, "translation": [0, 1, 0], "scale": [0.4, 1, 0.4]})
+    content["scenes"][0]["nodes"].append(len(content["nodes"]) - 1)
+    content["nodes"][1].update({"translation": [0, 6, 9], "rotation": [-0.3, 0, 0, 0.954]})
+    scene.write_text(json.dumps(content))
+    candelabra("learn", scene, "--rays", "0.1", "--output", table)
+    candelabra("inspect", table, "--html", page)
+    return page
+
+
+@pytest.fixture(scope="session")
 def diff_page(candelabra, scenes, folder) -> Path:
     page = folder / "diff.html"
     candelabra("diff", *scenes, "--html", page, code=1)

@@ -6,7 +6,7 @@ import pytest
 from conftest import HOSTILE
 from PIL import Image
 
-PAGES = ["inspect_page", "diff_page", "measure_page"]
+PAGES = ["inspect_page", "diff_page", "measure_page", "table_page"]
 COLUMN = "[...document.querySelector('table').tBodies[0].rows].map(row => row.cells[%d].%s)"
 """What stands in a column of the first table."""
 
@@ -107,21 +107,35 @@ def test_the_slider_leafs_through_the_levels(browser, inspect_page):
     assert browser.run(boxes % 0) == 1 < browser.run(boxes % last)
 
 
-def test_the_heat_map_shows_where_it_is_brighter(browser, diff_page):
-    browser.open(diff_page)
-    draw = """(async () => {
-        const image = document.querySelector('.heat img');
+def pixels_of(browser, image: str) -> list[tuple[int, int, int, int]]:
+    """The pixels of an image that a script finds."""
+    draw = f"""(async () => {{
+        const image = {image};
         await image.decode();
         const canvas = document.createElement('canvas');
         [canvas.width, canvas.height] = [image.naturalWidth, image.naturalHeight];
         const context = canvas.getContext('2d');
         context.drawImage(image, 0, 0);
         return [...context.getImageData(0, 0, canvas.width, canvas.height).data];
-    })()"""
+    }})()"""
     data = browser.run(draw)
-    pixels = list(zip(data[::4], data[1::4], data[2::4], data[3::4]))
+    return list(zip(data[::4], data[1::4], data[2::4], data[3::4]))
+
+
+def test_the_heat_map_shows_where_it_is_brighter(browser, diff_page):
+    browser.open(diff_page)
+    pixels = pixels_of(browser, "document.querySelector('.heat img')")
     assert any(a == 255 and r > b + 40 for r, g, b, a in pixels), "somewhere it is brighter"
     assert any(a == 255 and b > r + 40 for r, g, b, a in pixels), "somewhere it is darker"
+
+
+def test_cells_are_dark_where_light_is_hidden(browser, table_page):
+    browser.open(table_page)
+    plan = "Object.assign(new Image(), {src: document.querySelectorAll('svg image')[0].href.baseVal})"
+    pixels = pixels_of(browser, plan)
+    assert any(a == 255 and r > b + 60 for r, g, b, a in pixels), "somewhere all is seen"
+    assert any(a == 255 and b > r for r, g, b, a in pixels), "somewhere it is hidden"
+    assert browser.run("document.querySelectorAll('.plan .key img').length") == 1
 
 
 def test_dark_is_dark_and_light_is_light(browser, page):

@@ -17,6 +17,7 @@ mod lens;
 mod linking;
 mod moving;
 mod noise;
+mod occluders;
 mod ranges;
 mod real;
 mod references;

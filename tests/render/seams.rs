@@ -88,7 +88,12 @@ fn cells_have_no_seams() {
             let row =
                 |byte| Veil { group: 0, weights: [255, byte, 255, byte, 255, byte, 255, byte] };
             let planes = vec![Plane { at: 0.8, width, axis: 0 }];
-            Table { tree: set.tree.still_key(), planes, rows: vec![row(255), row(215)] }
+            Table {
+                tree: set.tree.still_key(),
+                planes,
+                rows: vec![row(255), row(215)],
+                ..Table::default()
+            }
         }
     };
     let [sharp, soft] = [0.0, 0.75].map(|width| largest_jump(&profile(split(0.1), table(width))));

@@ -4,9 +4,10 @@ use crate::page;
 use crate::stderr::say;
 use anyhow::{Result, bail};
 use candelabra::diff::{
-    DiffOptions, Side, SideError, Text, compare, compare_folders, html, look_at_both,
+    DiffOptions, Side, SideError, TableDiff, TableStanding, Text, compare, compare_folders, html,
+    look_at, look_at_both, names_table,
 };
-use candelabra::pipeline::View;
+use candelabra::pipeline::{View, is_table_file, open_learned};
 use clap::Args;
 use std::fmt::Display;
 use std::io::{self, BufWriter, StdoutLock, Write};
@@ -14,14 +15,16 @@ use std::path::PathBuf;
 use std::process::ExitCode;
 
 /// Compares the lights of two versions: tree files (.ltree), scenes (.gltf, .glb, .obj), or one of
-/// each; or all shots of two folders, matched by name.
+/// each; or all shots of two folders, matched by name. A table of what is hidden (.lvis) is held against a
+/// scene, a tree or another table: is it out of date, and why?
 ///
 /// Lights are listed by their share: of all energy or of all picks, whichever they gained or lost more
 /// of. Picks are compared where paths from the camera of a scene go, of two trees around the lights. A
 /// scene without a camera is seen as the other version is, or as by --fit. Prims that send no light are
 /// not compared.
 ///
-/// Ends with 0 if they are the same, 1 if they differ and 2 if they cannot be compared.
+/// Ends with 0 if they are the same, 1 if they differ and 2 if they cannot be compared. A table that is out of
+/// date is a difference.
 #[derive(Args)]
 pub struct Arguments {
     /// The version before
@@ -37,6 +40,9 @@ pub struct Arguments {
     /// Write a page too, with pictures of the lights and of what the camera sees; not of folders
     #[arg(long, value_name = "FILE")]
     html: Option<PathBuf>,
+    /// Tell whether this table of what is hidden (.lvis) is out of date for the version after, and why
+    #[arg(long, value_name = "TABLE")]
+    learned: Option<PathBuf>,
     #[command(flatten)]
     view: View,
     /// Threads; as many as there are cores if not given
@@ -58,6 +64,9 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     if let Some(page) = &arguments.html {
         page::check(page, &[before, after])?;
     }
+    if names_table(before, after) {
+        return run_of_table(arguments);
+    }
     match [before, after].map(|path| path.is_dir()) {
         [false, false] => {
             let (before, after) = rayon::join(|| Side::open(before), || Side::open(after));
@@ -70,12 +79,19 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
             }
             let for_page = arguments.html.is_some();
             let options = DiffOptions { unchanged: for_page, heat: for_page };
-            let diff = compare(&before, &after, &options)?;
+            let mut diff = compare(&before, &after, &options)?;
+            if let Some(path) = &arguments.learned {
+                diff.table = Some(TableStanding::of(path, &open_learned(path, true)?, &after)?);
+            }
+            let is_same = diff.is_same() && diff.table.as_ref().is_none_or(|t| t.is_up_to_date());
             if let Some(page) = &arguments.html {
                 page::write(page, &html(&diff))?;
             }
             print(arguments, |out| diff.write_json(out), |most| Text { of: &diff, most })?;
-            Ok(if diff.is_same() { ExitCode::SUCCESS } else { DIFFERENT.into() })
+            Ok(if is_same { ExitCode::SUCCESS } else { DIFFERENT.into() })
+        }
+        [true, true] if arguments.learned.is_some() => {
+            bail!("{}: a table is of one shot, and this is a folder", after.display())
         }
         [true, true] if arguments.html.is_some() => {
             bail!("{}: a page compares two files, and these are folders", before.display())
@@ -94,6 +110,31 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
             bail!(SideError::FolderAndFile { folder: folder.clone(), file: file.clone() })
         }
     }
+}
+
+/// A table against a scene, a tree or another table.
+fn run_of_table(arguments: &Arguments) -> Result<ExitCode> {
+    let Arguments { before, after, .. } = arguments;
+    if arguments.html.is_some() || arguments.learned.is_some() {
+        let table = if is_table_file(before) { before } else { after };
+        bail!(
+            "{}: is a table of what is hidden; --html and --learned are for scenes and trees",
+            table.display()
+        );
+    }
+    let diff = match [before, after].map(|path| is_table_file(path)) {
+        [true, true] => TableDiff::of_two(before, after)?,
+        [_, is_after] => {
+            let (table, version) = if is_after { (after, before) } else { (before, after) };
+            let mut side = Side::open(version)?;
+            if let Some(note) = look_at(&mut side, &arguments.view)? {
+                say(format_args!("note: {note}"));
+            }
+            TableDiff::of(table, &side, is_after)?
+        }
+    };
+    print(arguments, |out| diff.write_json(out), |most| Text { of: &diff, most })?;
+    Ok(if diff.is_same() { ExitCode::SUCCESS } else { DIFFERENT.into() })
 }
 
 fn print<T: Display>(

@@ -4,19 +4,14 @@ use crate::page;
 use crate::stderr::say;
 use anyhow::{Context, Result, ensure};
 use candelabra::emitter::Emitters;
-use candelabra::inspect::{self, SceneReport, TreeReport};
-use candelabra::light_tree::veil::decode;
-use candelabra::light_tree::{LightTree, WIDTH};
+use candelabra::inspect::{self, SceneReport, TableReport, TreeReport};
+use candelabra::light_tree::LightTree;
 use candelabra::page::{Lines, Short, counted, plain_json};
 use candelabra::pipeline::{self, Strict};
 use clap::Args;
 use serde::Serialize;
-use serde_json::json;
 use std::io::Write;
 use std::path::PathBuf;
-
-/// A cluster with a smaller weight is called hidden.
-const HIDDEN: f32 = 0.25;
 
 #[derive(Args)]
 pub struct Arguments {
@@ -34,7 +29,8 @@ pub struct Arguments {
     /// How far down the graph goes
     #[arg(long, requires = "dot", default_value_t = 2)]
     depth: usize,
-    /// Write a page with pictures of the lights and the clusters; a scene's tree is built for it
+    /// Write a page with pictures of the lights and the clusters, or of where how much is hidden; a scene's tree is
+    /// built for it
     #[arg(long, value_name = "FILE", group = "form")]
     html: Option<PathBuf>,
     /// Take notes about a scene for errors: all, or those of the categories given, such as
@@ -59,33 +55,29 @@ pub fn run(arguments: &Arguments) -> Result<()> {
 
 /// A table of what is hidden from where.
 fn show_table(arguments: &Arguments) -> Result<()> {
+    let file = arguments.file.display().to_string();
     ensure!(
-        !arguments.dot && arguments.html.is_none(),
-        "{}: --dot and --html draw scenes and trees; of a table there is --json",
-        arguments.file.display()
+        !arguments.dot,
+        "{file}: --dot draws scenes and trees; of a table there are --json and --html"
     );
     let table = pipeline::open_learned(&arguments.file, true)?;
-    let cells = table.view().map_or(0, |learned| learned.cells.count());
-    let groups = table.rows().len() / cells.max(1);
-    let lanes = table.rows().iter().flat_map(|row| row.weights);
-    let below = lanes.filter(|&byte| decode(byte) < HIDDEN).count();
-    let share = below as f64 / (table.rows().len() * WIDTH).max(1) as f64;
-    let (bytes, meta) = (table.byte_length(), table.meta());
+    let report = TableReport::of(&table);
     if arguments.json {
-        let learned: serde_json::Value = serde_json::from_str(meta).unwrap_or_default();
-        return print_json(&json!({
-            "bytes": bytes, "cells": cells, "groups": groups, "hidden": share, "learned": learned,
-        }));
+        return print_json(&report);
+    }
+    if let Some(page) = &arguments.html {
+        return page::write(page, &inspect::table_html(&table, &report, &file));
     }
     let mut out = Lines(std::io::stdout().lock());
-    writeln!(out, "{}: sound", arguments.file.display())?;
-    writeln!(out, "  {bytes} bytes; {meta}")?;
-    let (cells, groups) = (counted(cells, "cell"), counted(groups, "group"));
-    writeln!(
-        out,
-        "  {cells}, {groups} in each; {:.1} % of their clusters are hidden",
-        100.0 * share
-    )?;
+    writeln!(out, "{file}: sound")?;
+    writeln!(out, "  {} bytes; {}", report.bytes, table.meta())?;
+    let (cells, groups) = (counted(report.cells, "cell"), counted(report.groups, "group"));
+    let share = 100.0 * report.hidden;
+    writeln!(out, "  {cells}, {groups} in each; {share:.1} % of their clusters are hidden")?;
+    if let Some(share) = report.light_hidden {
+        let share = 100.0 * share;
+        writeln!(out, "  {share:.1} % of the light is hidden, in the mean of the cells")?;
+    }
     Ok(())
 }
 

@@ -5,7 +5,7 @@ use crate::stderr::say;
 use crate::stop::{STOPPED, Stop};
 use anyhow::Result;
 use candelabra::page::{Lines, counted};
-use candelabra::pipeline::{LearnError, LearnJob, Strict, View};
+use candelabra::pipeline::{Budget, LearnError, LearnJob, Strict, View, option};
 use candelabra::render::frames::Frames;
 use clap::Args;
 use std::io::Write;
@@ -28,8 +28,12 @@ pub struct Arguments {
     #[command(flatten)]
     view: View,
     /// Rays to lights, in millions
-    #[arg(long, value_name = "MILLIONS", default_value_t = LearnJob::RAYS as f64 / 1e6, value_parser = millions)]
+    #[arg(long, value_name = "MILLIONS", default_value_t = Budget::RAYS as f64 / 1e6, value_parser = millions)]
     rays: f64,
+    /// How long it may take, in place of a number of rays: 90, 90s, 10m or 1.5h, from the start of the program.
+    /// How many rays that allows is found out first, and told: with --rays, they give the same table anywhere
+    #[arg(long, conflicts_with = "rays", value_parser = option::duration)]
+    time: Option<f64>,
     /// As given to build; may be given again
     #[arg(long, value_name = "PATH")]
     force_light: Vec<String>,
@@ -45,7 +49,8 @@ pub struct Arguments {
 }
 
 fn millions(text: &str) -> Result<f64, String> {
-    let number = text.parse().ok().filter(|millions| (0.001..=4000.0).contains(millions));
+    let [least, most] = Budget::RANGE.map(|rays| rays as f64 / 1e6);
+    let number = text.parse().ok().filter(|millions| (least..=most).contains(millions));
     number.ok_or_else(|| "write a number from 0.001 to 4000".into())
 }
 
@@ -59,7 +64,10 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
         frames: arguments.frames.clone(),
         view: arguments.view.clone(),
         output: arguments.output.clone().unwrap_or_else(|| arguments.scene.with_extension("lvis")),
-        rays: (arguments.rays * 1e6) as u64,
+        budget: match arguments.time {
+            Some(seconds) => Budget::Seconds(seconds),
+            None => Budget::Rays((arguments.rays * 1e6).round() as u64),
+        },
         force_lights: arguments.force_light.clone(),
         strict: arguments.strict.clone(),
     };
@@ -83,6 +91,9 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
         report.learning.as_secs_f64(),
         100.0 * report.hidden
     )?;
+    if arguments.time.is_some() {
+        writeln!(out, "{output}: --rays {} gives the same table", report.budget as f64 / 1e6)?;
+    }
     match report.cells {
         0 => writeln!(out, "{output}: next to nothing is hidden here: the table is empty")?,
         cells => writeln!(out, "{output}: {}, {} bytes", counted(cells, "cell"), report.bytes)?,

@@ -11,7 +11,9 @@ use candelabra::measure::{
     self, Asked, Cache, Converged, Entrant, Machine, Onlooker, ProbeOptions, Report, ShotCost,
     Subject, Terms, Trade, TradeError, TradeOptions, Way, at_probes,
 };
-use candelabra::pipeline::{Effort, Event, Stamper, Watch, caveat, open_learned, option, view_key};
+use candelabra::pipeline::{
+    Effort, Event, Stamper, Watch, caveat, open_learned, option, view_keys,
+};
 use candelabra::render::beauty::Beauty;
 use candelabra::render::frames::Frames;
 use candelabra::render::knob;
@@ -219,8 +221,8 @@ fn measure(arguments: &Arguments, display: &Display) -> Result<Measured> {
         RenderDelegate::new(&shot.scene, &shot.emitters, shot.camera.clone(), base.clone());
     let learned = arguments.learned.as_ref().map(|path| open_learned(path, true)).transpose()?;
     if let Some((opened, path)) = learned.as_ref().zip(arguments.learned.as_ref()) {
-        let view = view_key(&shot.scene, &shot.camera);
-        if let Some(text) = caveat(opened, path, shot.tree.still_key(), view) {
+        let view = view_keys(&shot.scene, &shot.camera);
+        if let Some(text) = caveat(opened, path, shot.tree.still_key(), &view) {
             say(format_args!("note: {text}"));
         }
         delegate.set_learned(opened.view());

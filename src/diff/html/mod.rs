@@ -180,6 +180,7 @@ mod tests {
             totals: Totals::default(),
             picking: None,
             changes: (0..MOST_ROWS + 4_000).map(change).collect(),
+            table: None,
             unchanged: Vec::new(),
             heat: None,
         };

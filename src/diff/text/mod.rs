@@ -1,6 +1,7 @@
 //! A comparison for people.
 
 mod change;
+mod table;
 
 use super::{Diff, FolderDiff, Outcome, PickingChange, ProbePlaces, Verb};
 use crate::page::{Count, Plain, Short, Triple, counted};
@@ -26,11 +27,13 @@ impl fmt::Display for Text<'_, Diff> {
         write!(f, "{} -> {}: ", Plain(&before.file), Plain(&after.file))?;
         if self.of.is_same() {
             let emitters = counted(totals.after.emitters, "emitter");
-            return writeln!(f, "the same {} of {emitters}", counted(totals.after.lights, "light"));
+            writeln!(f, "the same {} of {emitters}", counted(totals.after.lights, "light"))?;
+            return self.write_table(f);
         }
         let all = totals.unchanged + self.of.changes.len();
         writeln!(f, "{} of {} differ", Count(self.of.changes.len()), counted(all, "light"))?;
         self.write_totals(f)?;
+        self.write_table(f)?;
         self.write_changes(f)
     }
 }

@@ -1,6 +1,9 @@
 //! A tree as a page: what it is, where its lights and clusters are, and which matter.
 
 mod plan;
+mod table;
+
+pub use table::table_html;
 
 use super::features::{Feature, FeatureState};
 use super::report::{LightReport, TreeReport, by_energy, light};

@@ -62,6 +62,32 @@ impl Cells<'_> {
         }
         Cell((at - self.0.len()) as u32)
     }
+
+    /// Calls `visit` with each cell and the part of a box where receivers of some normal are of that cell:
+    /// smallest and largest corner. Bands are left out of account.
+    pub fn for_each_box(&self, around: [Vec3; 2], visit: &mut impl FnMut(Cell, [Vec3; 2])) {
+        self.boxes_below(0, around, visit);
+    }
+
+    fn boxes_below(
+        &self,
+        node: usize,
+        [low, high]: [Vec3; 2],
+        visit: &mut impl FnMut(Cell, [Vec3; 2]),
+    ) {
+        let Some(plane) = self.0.get(node) else {
+            return visit(Cell((node - self.0.len()) as u32), [low, high]);
+        };
+        let axis = plane.axis as usize % 6;
+        let (mut until, mut from) = (high, low);
+        if axis < 3 {
+            // What is no number divides nothing off.
+            let at = plane.at.max(low[axis]).min(high[axis]);
+            (until[axis], from[axis]) = (at, at);
+        }
+        self.boxes_below(2 * node + 1, [low, until], visit);
+        self.boxes_below(2 * node + 2, [from, high], visit);
+    }
 }
 
 /// The coordinates of a receiver.

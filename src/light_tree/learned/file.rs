@@ -7,6 +7,7 @@ use crate::store::{
     rules,
 };
 use bytemuck::Pod;
+use glam::Vec3;
 use std::ops::Range;
 
 /// What the file begins with.
@@ -16,16 +17,19 @@ const META: SectionId = SectionId(*b"META");
 const KEYS: SectionId = SectionId(*b"KEYS");
 const PLANES: SectionId = SectionId(*b"PLAN");
 const VEILS: SectionId = SectionId(*b"VEIL");
+const AREA: SectionId = SectionId(*b"AREA");
+const HIDDEN: SectionId = SectionId(*b"HIDN");
+const ALL: [SectionId; 6] = [META, KEYS, PLANES, VEILS, AREA, HIDDEN];
 
 /// More levels than this no table has.
 const MOST_LEVELS: u32 = 24;
 
 /// The rules of the file beyond those of its container.
-pub const RULES_OF_LEARNED: [&[Rule]; 3] = [OF_KEYS, OF_PLANES, OF_VEILS];
+pub const RULES_OF_LEARNED: [&[Rule]; 5] = [OF_KEYS, OF_PLANES, OF_VEILS, OF_AREA, OF_HIDDEN];
 
 rules! {
     KEYS, OF_KEYS:
-    KEYS_ARE_TWO = "there are two";
+    KEYS_ARE_FOUR = "there are four";
 }
 
 rules! {
@@ -40,27 +44,57 @@ rules! {
     GROUPS_ASCEND = "the groups of a cell ascend; rows of no group are the last";
 }
 
+rules! {
+    AREA, OF_AREA:
+    AREA_IS_A_BOX = "it is six finite numbers, the first three not above the last three, or nothing";
+}
+
+rules! {
+    HIDDEN, OF_HIDDEN:
+    HIDDEN_IS_OF_EACH = "there is one for each cell, or none";
+}
+
+/// What a table was learned from beside the tree: BLAKE3 of each. None depends on how bright anything is.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct ViewKeys {
+    /// The lights at infinity, in their order.
+    pub infinite: [u8; 32],
+    /// All that rays can meet: where it is, and where it lets light through.
+    pub geometry: [u8; 32],
+    /// The camera.
+    pub camera: [u8; 32],
+}
+
 /// A table in the bytes of its file.
 pub struct LearnedFile<D> {
     container: Container<D>,
     keys: Range<usize>,
     planes: Range<usize>,
     veils: Range<usize>,
+    area: Option<Range<usize>>,
+    hidden: Option<Range<usize>>,
 }
 
 impl Table {
-    /// The bytes of its file. `view` is the key of what it was learned through.
-    pub fn to_bytes(&self, view: [u8; 32], meta: &str) -> AlignedBytes {
-        let keys = [self.tree, view];
+    /// The bytes of its file. `view` has the keys of what it was learned from.
+    pub fn to_bytes(&self, view: ViewKeys, meta: &str) -> AlignedBytes {
+        let keys = [self.tree, view.infinite, view.geometry, view.camera];
         let mut hasher = blake3::Hasher::new();
         hasher.update(meta.as_bytes()).update(keys.as_flattened());
         hasher.update_rayon(bytemuck::cast_slice(&self.planes));
         hasher.update_rayon(bytemuck::cast_slice(&self.rows));
+        hasher.update(bytemuck::cast_slice(self.area.as_slice())).update(&self.hidden);
         let mut writer = ContainerWriter::default();
         writer.section(META, false, meta.as_bytes());
         writer.section(KEYS, true, &keys);
         writer.section(PLANES, true, &self.planes);
         writer.section(VEILS, true, &self.rows);
+        if let Some(area) = &self.area {
+            writer.section(AREA, false, area.as_flattened());
+        }
+        if !self.hidden.is_empty() {
+            writer.section(HIDDEN, false, &self.hidden);
+        }
         writer.finish_as(&LEARNED_FILE, *hasher.finalize().as_bytes())
     }
 }
@@ -71,7 +105,7 @@ impl<D: AsRef<[u8]>> LearnedFile<D> {
     /// # Errors
     /// If the header or the section table is not sound.
     pub fn open(data: D) -> Result<LearnedFile<D>, StoreError> {
-        let container = Container::open_as(&LEARNED_FILE, data, &[META, KEYS, PLANES, VEILS])?;
+        let container = Container::open_as(&LEARNED_FILE, data, &ALL)?;
         fn required<T: Pod>(
             container: &Container<impl AsRef<[u8]>>,
             id: SectionId,
@@ -82,7 +116,9 @@ impl<D: AsRef<[u8]>> LearnedFile<D> {
         let keys = required::<[u8; 32]>(&container, KEYS)?;
         let planes = required::<Plane>(&container, PLANES)?;
         let veils = required::<Veil>(&container, VEILS)?;
-        Ok(LearnedFile { container, keys, planes, veils })
+        let area = container.find::<f32>(AREA)?;
+        let hidden = container.find::<u8>(HIDDEN)?;
+        Ok(LearnedFile { container, keys, planes, veils, area, hidden })
     }
 
     /// Checks everything that the format promises.
@@ -92,8 +128,8 @@ impl<D: AsRef<[u8]>> LearnedFile<D> {
     pub fn verify(&self) -> Result<(), StoreError> {
         self.container.verify_checksums()?;
         let broken = |rule, record| Err(StoreError::Broken(Violation { rule, record }));
-        if self.keys().len() != 2 {
-            return broken(KEYS_ARE_TWO, Record::All);
+        if self.keys().len() != 4 {
+            return broken(KEYS_ARE_FOUR, Record::All);
         }
         let cells = self.planes().len() + 1;
         if !cells.is_power_of_two() || cells.ilog2() > MOST_LEVELS {
@@ -117,6 +153,17 @@ impl<D: AsRef<[u8]>> LearnedFile<D> {
                 return broken(GROUPS_ASCEND, Record::Row((cell * of_each + at + 1) as u32));
             }
         }
+        let area = self.view_of::<f32>(&self.area);
+        let is_box = |[low, high]: [&[f32]; 2]| {
+            area.iter().all(|number| number.is_finite())
+                && low.iter().zip(high).all(|(a, b)| a <= b)
+        };
+        if !area.is_empty() && (area.len() != 6 || !is_box([&area[..3], &area[3..]])) {
+            return broken(AREA_IS_A_BOX, Record::All);
+        }
+        if ![0, cells].contains(&self.hidden().len()) {
+            return broken(HIDDEN_IS_OF_EACH, Record::All);
+        }
         Ok(())
     }
 
@@ -127,12 +174,25 @@ impl<D: AsRef<[u8]>> LearnedFile<D> {
 
     /// The [tree](crate::light_tree::LightTree::still_key) that it was learned with.
     pub fn tree_key(&self) -> [u8; 32] {
-        self.keys().first().copied().unwrap_or_default()
+        self.key(0)
     }
 
-    /// The key of the geometry and the camera that it was learned from.
-    pub fn view_key(&self) -> [u8; 32] {
-        self.keys().get(1).copied().unwrap_or_default()
+    /// The keys of what it was learned from beside the tree.
+    pub fn view_keys(&self) -> ViewKeys {
+        ViewKeys { infinite: self.key(1), geometry: self.key(2), camera: self.key(3) }
+    }
+
+    /// The box around the receivers that it was learned at, if it tells: smallest and largest corner, world
+    /// space, metres.
+    pub fn area(&self) -> Option<[Vec3; 2]> {
+        let [x, y, z, to_x, to_y, to_z] = *self.view_of::<f32>(&self.area).first_chunk()?;
+        Some([Vec3::new(x, y, z), Vec3::new(to_x, to_y, to_z)])
+    }
+
+    /// Of each cell the share of the light that is hidden there, by importance and without any weights, in
+    /// parts of 255; nothing if it does not tell.
+    pub fn hidden(&self) -> &[u8] {
+        self.view_of(&self.hidden)
     }
 
     /// BLAKE3 over all that it says.
@@ -142,8 +202,7 @@ impl<D: AsRef<[u8]>> LearnedFile<D> {
 
     /// The JSON for people.
     pub fn meta(&self) -> &str {
-        let range = self.container.find::<u8>(META).ok().flatten();
-        let bytes: &[u8] = range.as_ref().map_or(&[], |range| self.container.view(range));
+        let bytes: &[u8] = self.view_of(&self.container.find::<u8>(META).ok().flatten());
         std::str::from_utf8(bytes).unwrap_or_default()
     }
 
@@ -169,5 +228,13 @@ impl<D: AsRef<[u8]>> LearnedFile<D> {
 
     fn keys(&self) -> &[[u8; 32]] {
         self.container.view(&self.keys)
+    }
+
+    fn key(&self, number: usize) -> [u8; 32] {
+        self.keys().get(number).copied().unwrap_or_default()
+    }
+
+    fn view_of<T: Pod>(&self, section: &Option<Range<usize>>) -> &[T] {
+        section.as_ref().map_or(&[], |range| self.container.view(range))
     }
 }

@@ -10,7 +10,7 @@ mod file;
 
 pub use super::veil::BESIDE;
 pub use cells::{Cells, Coordinates, Plane, coordinates, divide};
-pub use file::{LEARNED_FILE, LearnedFile, RULES_OF_LEARNED};
+pub use file::{LEARNED_FILE, LearnedFile, RULES_OF_LEARNED, ViewKeys};
 
 use super::veil::{Veil, Veils};
 
@@ -34,6 +34,11 @@ pub struct Table {
     pub planes: Vec<Plane>,
     /// The veils, cell after cell, with the same number for each. None if nothing is hidden.
     pub rows: Vec<Veil>,
+    /// The box around the receivers that it was learned at: smallest and largest corner, world space,
+    /// metres. For people; so is what follows.
+    pub area: Option<[[f32; 3]; 2]>,
+    /// Of each cell the share of the light that is hidden there, in parts of 255; or nothing.
+    pub hidden: Vec<u8>,
 }
 
 impl Table {

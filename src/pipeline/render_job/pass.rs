@@ -15,7 +15,7 @@ use crate::emitter::Emitters;
 use crate::light_tree::LightTree;
 use crate::pipeline::{
     Event, Glimpse, LearnedError, OpenedTable, PreviewStamp, ShotTrees, Stamp, Stamper, TreeError,
-    Watch, caveat, frames_of, frames_of_grey, glimpse, view_key, with_knobs,
+    Watch, caveat, frames_of, frames_of_grey, glimpse, view_keys, with_knobs,
 };
 use crate::render::beauty::Beauty;
 use crate::render::knob::pilot;
@@ -336,8 +336,8 @@ impl<'a> Pass<'a> {
             && !self.caveat_is_told
         {
             self.caveat_is_told = true;
-            let view = view_key(&self.shot.scene, &self.shot.camera);
-            let text = caveat(table, path, self.trees.for_frame(frame)?.still_key(), view);
+            let view = view_keys(&self.shot.scene, &self.shot.camera);
+            let text = caveat(table, path, self.trees.for_frame(frame)?.still_key(), &view);
             text.into_iter().for_each(|text| self.watch.tell(Event::Note { text }));
         }
         Ok(())

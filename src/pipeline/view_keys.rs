@@ -1,0 +1,153 @@
+//! Keys of what a table of what is hidden is learned from, beside its tree.
+//!
+//! Each tells apart what the others do not, so that a table that is out of date can say why. None depends on names, on
+//! the order in which meshes are listed or on how bright anything is: that does not change what is seen from
+//! where.
+
+use crate::light_tree::learned::ViewKeys;
+use crate::scene::{
+    AlphaMode, Camera, Channel, Instance, Keys, LightKind, Links, Membership, Mesh, Pose, Scene,
+};
+use blake3::Hasher;
+use bytemuck::{NoUninit, cast_slice};
+use rayon::prelude::*;
+
+type Key = [u8; 32];
+
+/// The keys of a scene that is seen through a camera.
+pub fn view_keys(scene: &Scene, camera: &Camera) -> ViewKeys {
+    let places = places(scene);
+    let (infinite, geometry) =
+        rayon::join(|| infinite(scene, &places), || geometry(scene, &places));
+    ViewKeys { infinite, geometry, camera: through(camera, &places) }
+}
+
+/// Where each node is: what stands still by its place in the world, what moves by all that moves it.
+fn places(scene: &Scene) -> Vec<Key> {
+    let pose = scene.pose_at(0.0);
+    let moving = scene.moving_nodes();
+    let mut places: Vec<Key> = Vec::with_capacity(scene.nodes.len());
+    for (at, node) in scene.nodes.iter().enumerate() {
+        places.push(match moving[at] {
+            false => still(&pose, at as u32),
+            true => {
+                let mut hasher = Hasher::new();
+                let clock = (scene.timeline.first_frame, scene.timeline.frames_per_second);
+                hasher.update(format!("{:?} {clock:?} {}", node.local, scene.origin).as_bytes());
+                hasher.update(&node.parent.map_or([0; 32], |parent| places[parent as usize]));
+                node.channels.iter().for_each(|channel| add_channel(&mut hasher, channel));
+                finish(&hasher)
+            }
+        });
+    }
+    places
+}
+
+fn still(pose: &Pose, node: u32) -> Key {
+    let mut hasher = Hasher::new();
+    // Zero has a sign that means nothing.
+    let numbers = pose.world(node).to_cols_array().map(|number| number + 0.0);
+    hasher.update(cast_slice(&numbers));
+    finish(&hasher)
+}
+
+fn add_channel(hasher: &mut Hasher, channel: &Channel) {
+    fn add<T: NoUninit>(hasher: &mut Hasher, keys: &Keys<impl Sized>, values: &[T]) {
+        hasher.update(format!("{:?} {}", keys.interpolation, values.len()).as_bytes());
+        hasher.update(cast_slice(&keys.times_s)).update(cast_slice(values));
+    }
+    match channel {
+        Channel::Translation(keys) => add(hasher.update(b"t"), keys, &keys.values),
+        Channel::Rotation(keys) => {
+            let values: Vec<[f32; 4]> = keys.values.iter().map(|turn| turn.to_array()).collect();
+            add(hasher.update(b"r"), keys, &values);
+        }
+        Channel::Scale(keys) => add(hasher.update(b"s"), keys, &keys.values),
+    }
+}
+
+/// Lights at infinity, in the order of their rows: weights are told by row.
+fn infinite(scene: &Scene, places: &[Key]) -> Key {
+    let mut hasher = Hasher::new();
+    for light in &scene.lights {
+        let text = match light.kind {
+            LightKind::Distant { angle_rad, .. } => format!("sun {angle_rad}"),
+            LightKind::Dome { texture: Some(texture), .. } => {
+                let texture = &scene.textures[texture as usize];
+                hasher.update(texture.bytes());
+                format!("dome {} {}", texture.width, texture.height)
+            }
+            LightKind::Dome { texture: None, .. } => "dome".into(),
+            _ => continue,
+        };
+        hasher.update(format!("{text} {} {:?}", light.forced, light.visibility).as_bytes());
+        hasher.update(&places[light.node as usize]);
+    }
+    finish(&hasher)
+}
+
+fn geometry(scene: &Scene, places: &[Key]) -> Key {
+    let shapes: Vec<Key> = scene.meshes.par_iter().map(|mesh| shape(scene, mesh)).collect();
+    let instance = |(row, instance): (usize, &Instance)| {
+        let mut hasher = Hasher::new();
+        hasher.update(&shapes[instance.mesh as usize]).update(&places[instance.node as usize]);
+        hasher.update(format!("{:?}", instance.visibility).as_bytes());
+        add_links(&mut hasher, scene, scene.linking.of_instance(row as u32));
+        finish(&hasher)
+    };
+    let mut keys: Vec<Key> = scene.instances.par_iter().enumerate().map(instance).collect();
+    keys.par_sort_unstable();
+    let mut hasher = Hasher::new();
+    hasher.update(keys.as_flattened());
+    // Which lights are shadowed by what.
+    for (light, links) in scene.linking.linked_lights() {
+        hasher.update(format!("{light} {:?}", links.shadow).as_bytes());
+    }
+    finish(&hasher)
+}
+
+/// The sets that geometry is in.
+fn add_links(hasher: &mut Hasher, scene: &Scene, links: Links) {
+    if let Some(row) = links.membership {
+        let membership: &Membership = &scene.linking.memberships()[row as usize];
+        hasher.update(format!("{membership:?}").as_bytes());
+    }
+}
+
+/// The triangles of a mesh, and what of them lets light through.
+fn shape(scene: &Scene, mesh: &Mesh) -> Key {
+    let mut hasher = Hasher::new();
+    hasher.update(format!("{} {}", mesh.positions.len(), mesh.triangles.len()).as_bytes());
+    hasher.update_rayon(cast_slice(&mesh.positions));
+    hasher.update_rayon(cast_slice(&mesh.triangles));
+    let material = mesh.material.map(|material| &scene.materials[material as usize]);
+    if let Some(material) = material.filter(|own| own.alpha_mode != AlphaMode::Opaque) {
+        hasher.update(format!("{:?} {}", material.alpha_mode, material.opacity).as_bytes());
+        let colors: Vec<f32> = mesh.colors.iter().map(|color| color.w).collect();
+        hasher.update(cast_slice(&colors));
+        if let Some(used) = material.base_color_texture {
+            let texture = &scene.textures[used.texture as usize];
+            let (size, wrap) = ([texture.width, texture.height], texture.wrap);
+            let how = (used.transform, size, wrap, texture.bilinear);
+            hasher.update(format!("{how:?}").as_bytes());
+            if let Some(uvs) = mesh.uv_sets.get(used.uv_set as usize) {
+                hasher.update_rayon(cast_slice(uvs));
+            }
+            let opacities: Vec<u8> = texture.opacities().collect();
+            hasher.update_rayon(&opacities);
+        }
+    }
+    finish(&hasher)
+}
+
+fn through(camera: &Camera, places: &[Key]) -> Key {
+    // A picture's brightness, and the place of its node in the list, are nothing that is seen.
+    let looks = Camera { node: 0, exposure_scale: 1.0, ..camera.clone() };
+    let mut hasher = Hasher::new();
+    hasher.update(format!("{looks:?}").as_bytes()).update(&places[camera.node as usize]);
+    finish(&hasher)
+}
+
+fn finish(hasher: &Hasher) -> Key {
+    *hasher.finalize().as_bytes()
+}
