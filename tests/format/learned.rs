@@ -5,6 +5,7 @@ use crate::table::probe;
 use candelabra::light_tree::Veil;
 use candelabra::light_tree::learned::{LearnedFile, Plane, RULES_OF_LEARNED, Table, ViewKeys};
 use candelabra::store::{AlignedBytes, StoreError};
+use proptest::prelude::*;
 
 const FORMAT: &str = include_str!("../../src/light_tree/learned/format.md");
 
@@ -85,6 +86,48 @@ fn all_damage_is_survived_unverified() {
         probe(&bytes);
         bytes[bit / 8] ^= 1 << (bit % 8);
     }
+}
+
+proptest! {
+    /// Several things wrong at once, anywhere: numbers that are set, runs that are copied elsewhere, a part that is
+    /// missing. `PROPTEST_CASES` asks for more of it.
+    #[test]
+    fn random_damage_is_survived_unverified(
+        edits in prop::collection::vec((any::<prop::sample::Index>(), number()), 0..8),
+        copies in prop::collection::vec(
+            (any::<prop::sample::Index>(), any::<prop::sample::Index>(), 1usize..40), 0..3
+        ),
+        missing in prop::option::of((any::<prop::sample::Index>(), 1usize..100)),
+    ) {
+        let mut bytes = bytes_of(&table()).as_ref().to_vec();
+        for (at, number) in edits {
+            let at = at.index(bytes.len() / 4) * 4;
+            bytes[at..at + 4].copy_from_slice(&number.to_le_bytes());
+        }
+        for (from, to, length) in copies {
+            let (from, to) = (from.index(bytes.len()), to.index(bytes.len()));
+            let length = length.min(bytes.len() - from.max(to));
+            bytes.copy_within(from..from + length, to);
+        }
+        if let Some((at, length)) = missing {
+            let at = at.index(bytes.len());
+            bytes.drain(at..(at + length).min(bytes.len()));
+        }
+        probe(&bytes);
+    }
+}
+
+/// A number that may mean something to someone.
+fn number() -> impl Strategy<Value = u32> {
+    prop_oneof![
+        any::<u32>(),
+        0u32..300,
+        any::<f32>().prop_map(f32::to_bits),
+        Just(u32::MAX),
+        Just(1 << 31),
+        prop_oneof![Just(f32::NAN), Just(f32::INFINITY), Just(1e38), Just(-0.0)]
+            .prop_map(f32::to_bits),
+    ]
 }
 
 #[test]
