@@ -8,9 +8,9 @@
 use super::importance::{Cluster, Sight, importance};
 use super::node::{self, Link, Node};
 use super::viewer::Viewer;
+use super::wide;
 use crate::bounds::LightBounds;
 use crate::math::built_in;
-use crate::math::widest::{Work, widest};
 use bytemuck::{Pod, Zeroable};
 
 /// Children of a cluster.
@@ -168,11 +168,11 @@ impl Group {
     /// The importance of each lane to a viewer, and how uncertain each is.
     #[inline]
     pub(super) fn weigh(&self, viewer: &impl Viewer) -> ([f64; WIDTH], [f32; WIDTH]) {
-        widest(Weighing { group: self, viewer })
+        wide::weigh(self, viewer)
     }
 
     #[inline(always)]
-    fn weigh_lanes(&self, viewer: &impl Viewer) -> ([f64; WIDTH], [f32; WIDTH]) {
+    pub(super) fn weigh_lanes(&self, viewer: &impl Viewer) -> ([f64; WIDTH], [f32; WIDTH]) {
         // Written once and compiled twice: few scenes have a light with a range.
         match !built_in::RANGE || self.range == [0; WIDTH] {
             true => self.weigh_as::<true>(viewer),
@@ -203,21 +203,6 @@ impl Group {
             weights[lane] = importance(self.energy(lane), products[lane], decays[lane]);
         }
         (weights, spreads)
-    }
-}
-
-/// A group to be weighed for a viewer.
-struct Weighing<'a, V> {
-    group: &'a Group,
-    viewer: &'a V,
-}
-
-impl<V: Viewer> Work for Weighing<'_, V> {
-    type Output = ([f64; WIDTH], [f32; WIDTH]);
-
-    #[inline(always)]
-    fn run(self) -> Self::Output {
-        self.group.weigh_lanes(self.viewer)
     }
 }
 

@@ -13,6 +13,7 @@
 //! | `group` | the eight children of a cluster, lane by lane |
 //! | `viewer` | who asks: a [`Receiver`], a [`Glossy`] one, or a stretch of a ray ([`Segment`]) |
 //! | `importance`, `glossy`, `segment` | what a cluster may send to each |
+//! | `wide` | the same code for wider vector registers |
 //! | `builder` | the partition (SAOH) and the bounds, deterministic and parallel |
 //! | `writer`, `records`, `tree` | the trees of a shot as a file, and that file opened |
 //! | `base` | what of an earlier version of the file has stayed the same |
@@ -55,6 +56,7 @@ mod variance;
 pub mod veil;
 mod verify;
 mod viewer;
+mod wide;
 mod writer;
 
 pub use base::Base;

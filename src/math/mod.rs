@@ -4,7 +4,7 @@
 //! orthonormal [`Frame`]s, area-preserving [`warp`]s of the unit square, [`angle`]s that are accurate
 //! near 0 and pi, [`directions`] under any matrix, transforms that keep shapes ([`Similarity`]),
 //! compensated [`sum`]s and linear [`color`]. Its [`random`] numbers depend on the seed and on
-//! nothing else. What is computed for many lanes is compiled for the [`widest`] registers, too.
+//! nothing else.
 
 pub mod angle;
 pub mod built_in;
@@ -15,7 +15,6 @@ pub mod random;
 mod similarity;
 pub mod sum;
 pub mod warp;
-pub mod widest;
 
 pub use frame::Frame;
 pub use similarity::Similarity;

@@ -1,8 +1,7 @@
 //! A set of triangles that a ray can search: the lower level of the kernel.
 
 use super::triangles::{Block, Ray, ShearedRay, plane_distance};
-use super::wide_bvh::{LEAF_SIZE, Visitor, WideBvh};
-use super::wide_node::{BoxRay, NONE};
+use super::wide_bvh::{BoxRay, LEAF_SIZE, NONE, WideBvh};
 use crate::bounds::Aabb;
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
@@ -78,49 +77,52 @@ impl Blas {
 
     /// Calls `met` with the triangles that the ray meets at a distance in `(0, tmax)`, near ones
     /// roughly first if `ORDERED`. It returns the new `tmax`; a negative one ends the search.
-    #[inline(always)]
+    #[inline]
     pub fn visit<const ORDERED: bool>(
         &self,
         ray: &Ray,
         tmax: f64,
         met: impl FnMut(&BlasHit) -> f64,
     ) {
-        let (origin, direction) = (ray.origin.as_vec3(), ray.direction.as_vec3());
-        let sheared = ShearedRay::new(origin, direction);
-        let search = Search { set: self, ray, sheared, tmax, met };
-        self.tree.walk::<ORDERED>(&BoxRay::new(origin, direction), search_limit(tmax), search);
-    }
-}
-
-/// A ray among the triangles of a set.
-struct Search<'a, F> {
-    set: &'a Blas,
-    ray: &'a Ray,
-    sheared: ShearedRay,
-    tmax: f64,
-    met: F,
-}
-
-impl<F: FnMut(&BlasHit) -> f64> Visitor for Search<'_, F> {
-    #[inline(always)]
-    fn visit(&mut self, leaf: u32) -> f32 {
-        let block = &self.set.blocks[leaf as usize];
-        let mut lanes = block.candidates(&self.sheared, search_limit(self.tmax));
-        while lanes != 0 {
-            let lane = lanes.trailing_zeros() as usize % LEAF_SIZE;
-            lanes &= lanes - 1;
-            let corners = block.get(lane);
-            let Some(t) = plane_distance(self.ray, corners) else { continue };
-            if !(t > 0.0 && t < self.tmax) {
-                continue;
-            }
-            let id = self.set.ids[leaf as usize][lane];
-            self.tmax = (self.met)(&BlasHit { t, id, corners });
-            if self.tmax < 0.0 {
-                return -1.0;
-            }
+        let d = ray.direction.abs();
+        if d.x >= d.y && d.x >= d.z {
+            self.visit_along::<ORDERED, 0>(ray, tmax, met)
+        } else if d.y >= d.z {
+            self.visit_along::<ORDERED, 1>(ray, tmax, met)
+        } else {
+            self.visit_along::<ORDERED, 2>(ray, tmax, met)
         }
-        search_limit(self.tmax)
+    }
+
+    fn visit_along<const ORDERED: bool, const KZ: usize>(
+        &self,
+        ray: &Ray,
+        mut tmax: f64,
+        mut met: impl FnMut(&BlasHit) -> f64,
+    ) {
+        let (origin, direction) = (ray.origin.as_vec3(), ray.direction.as_vec3());
+        let box_ray = BoxRay::new(origin, direction);
+        let sheared = ShearedRay::<KZ>::new(origin, direction);
+        let mut bound = search_limit(tmax);
+        self.tree.walk::<ORDERED>(&box_ray, bound, |leaf| {
+            let block = &self.blocks[leaf as usize];
+            let mut lanes = block.candidates(&sheared, bound);
+            while lanes != 0 {
+                let lane = lanes.trailing_zeros() as usize % LEAF_SIZE;
+                lanes &= lanes - 1;
+                let corners = block.get(lane);
+                let Some(t) = plane_distance(ray, corners) else { continue };
+                if !(t > 0.0 && t < tmax) {
+                    continue;
+                }
+                tmax = met(&BlasHit { t, id: self.ids[leaf as usize][lane], corners });
+                if tmax < 0.0 {
+                    return -1.0;
+                }
+                bound = search_limit(tmax);
+            }
+            bound
+        });
     }
 }
 

@@ -36,7 +36,6 @@ mod tests;
 mod tracer;
 mod triangles;
 mod wide_bvh;
-mod wide_node;
 
 pub use anchor::Anchor;
 pub use meeting::{Hit, HitSurface};

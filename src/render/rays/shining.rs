@@ -5,10 +5,8 @@
 //! Boxes know nothing of what hides them, so a ray that may meet light is to be traced.
 
 use super::blas::can_be_hit;
-use super::wide_bvh::{LEAF_SIZE, WideBvh};
-use super::wide_node::BoxRay;
+use super::wide_bvh::{BoxRay, LEAF_SIZE, WideBvh};
 use crate::bounds::Aabb;
-use crate::math::widest::{Work, widest};
 use glam::Vec3;
 
 /// About as many boxes at most stand for what does not move: more would cost memory and save little.
@@ -40,23 +38,8 @@ impl Shining {
 
     /// Whether a ray may meet any of it; if not, it surely meets none.
     pub fn may_be_met(&self, ray: &BoxRay) -> bool {
-        widest(Look { at: self, ray })
-    }
-}
-
-/// A ray's look at the boxes.
-struct Look<'a> {
-    at: &'a Shining,
-    ray: &'a BoxRay,
-}
-
-impl Work for Look<'_> {
-    type Output = bool;
-
-    #[inline(always)]
-    fn run(self) -> bool {
         let mut is_met = false;
-        self.at.tree.walk::<false>(self.ray, f32::INFINITY, |_| {
+        self.tree.walk::<false>(ray, f32::INFINITY, |_| {
             is_met = true;
             -1.0
         });

@@ -7,12 +7,10 @@ use super::shining::Shining;
 use super::sight::{Seen, SeenLight, Sight};
 use super::sphere::Sphere;
 use super::triangles::{Ray, barycentric};
-use super::wide_bvh::WideBvh;
-use super::wide_node::{BoxRay, NONE};
+use super::wide_bvh::{BoxRay, NONE, WideBvh};
 use super::{Anchor, RayScene, in_world, may_shine, world_of};
 use crate::bounds::Aabb;
 use crate::math::built_in;
-use crate::math::widest::{Work, widest};
 use crate::scene::{LightKind, Pose, Scene};
 use glam::{DAffine3, DVec3, Vec2, Vec3};
 
@@ -211,18 +209,7 @@ impl<'a> Tracer<'a> {
 
     /// Calls `met` with everything that a ray meets at a distance in `(0, tmax)`, near things roughly
     /// first if `ORDERED`. It returns the new `tmax`; a negative one ends the search.
-    #[inline]
     fn visit<'b, const ORDERED: bool>(
-        &'b self,
-        ray: &Ray,
-        tmax: f64,
-        met: impl FnMut(&Meeting<'b>) -> f64,
-    ) {
-        widest(Visit::<ORDERED, _> { tracer: self, ray, tmax, met });
-    }
-
-    #[inline(always)]
-    fn visit_all<'b, const ORDERED: bool>(
         &'b self,
         ray: &Ray,
         mut tmax: f64,
@@ -265,23 +252,6 @@ impl<'a> Tracer<'a> {
             On::Triangle { id, .. } => &self.instances[id.instance as usize],
             On::Sphere(sphere) => &self.lights[sphere.light as usize],
         }
-    }
-}
-
-/// A search for what a ray meets.
-struct Visit<'v, 'b, const ORDERED: bool, F> {
-    tracer: &'b Tracer<'b>,
-    ray: &'v Ray,
-    tmax: f64,
-    met: F,
-}
-
-impl<'b, const ORDERED: bool, F: FnMut(&Meeting<'b>) -> f64> Work for Visit<'_, 'b, ORDERED, F> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run(self) {
-        self.tracer.visit_all::<ORDERED>(self.ray, self.tmax, self.met);
     }
 }
 

@@ -17,38 +17,29 @@ pub struct Ray {
     pub direction: DVec3,
 }
 
-/// What Woop's test needs of a ray.
+/// What Woop's test needs of a ray whose largest direction component is `KZ`.
 #[derive(Clone, Copy, Debug)]
-pub struct ShearedRay {
-    /// By axis, in the order of `axes`.
+pub struct ShearedRay<const KZ: usize> {
     origin: [Vec4; 3],
     shear_x: Vec4,
     shear_y: Vec4,
     scale_z: Vec4,
-    /// Which axes play the parts of x, y and z: the direction's largest component is that of the last.
-    axes: [usize; 3],
 }
 
-impl ShearedRay {
-    /// The direction must not be 0.
+impl<const KZ: usize> ShearedRay<KZ> {
+    const KX: usize = (KZ + 1) % 3;
+    const KY: usize = (KZ + 2) % 3;
+
+    /// `direction[KZ]` must not be 0.
     #[inline]
     pub fn new(origin: Vec3, direction: Vec3) -> Self {
-        let size = direction.abs();
-        let axes = if size.x >= size.y && size.x >= size.z {
-            [1, 2, 0]
-        } else if size.y >= size.z {
-            [2, 0, 1]
-        } else {
-            [0, 1, 2]
-        };
-        let [x, y, z] = axes.map(|axis| direction[axis]);
-        let scale = 1.0 / z;
+        let d = direction.to_array();
+        let scale = 1.0 / d[KZ];
         ShearedRay {
-            origin: axes.map(|axis| Vec4::splat(origin[axis])),
-            shear_x: Vec4::splat(x * scale),
-            shear_y: Vec4::splat(y * scale),
+            origin: origin.to_array().map(Vec4::splat),
+            shear_x: Vec4::splat(d[Self::KX] * scale),
+            shear_y: Vec4::splat(d[Self::KY] * scale),
             scale_z: Vec4::splat(scale),
-            axes,
         }
     }
 }
@@ -73,27 +64,22 @@ impl Block {
     }
 
     /// The corners in a lane.
-    #[inline(always)]
     pub fn get(&self, lane: usize) -> [DVec3; 3] {
-        let corner = |[x, y, z]: &[Vec4; 3]| {
-            DVec3::new(f64::from(x[lane]), f64::from(y[lane]), f64::from(z[lane]))
-        };
-        let [a, b, c] = &self.corners;
-        [corner(a), corner(b), corner(c)]
+        self.corners.map(|corner| DVec3::from(corner.map(|axis| f64::from(axis[lane]))))
     }
 
     /// A bit for each lane whose triangle the line goes through, some of it between 0 and `tmax`.
     #[inline(always)]
-    pub fn candidates(&self, ray: &ShearedRay, tmax: f32) -> u32 {
-        let [kx, ky, kz] = ray.axes;
-        let sheared = |corner: &[Vec4; 3]| {
-            let z = corner[kz % 3] - ray.origin[2];
-            let x = (corner[kx % 3] - ray.origin[0]) - ray.shear_x * z;
-            let y = (corner[ky % 3] - ray.origin[1]) - ray.shear_y * z;
+    pub fn candidates<const KZ: usize>(&self, ray: &ShearedRay<KZ>, tmax: f32) -> u32 {
+        let [a, b, c] = [0, 1, 2].map(|corner| {
+            let corner: &[Vec4; 3] = &self.corners[corner];
+            let z = corner[KZ] - ray.origin[KZ];
+            let kx = ShearedRay::<KZ>::KX;
+            let ky = ShearedRay::<KZ>::KY;
+            let x = (corner[kx] - ray.origin[kx]) - ray.shear_x * z;
+            let y = (corner[ky] - ray.origin[ky]) - ray.shear_y * z;
             (x, y, z * ray.scale_z)
-        };
-        let (a, b, c) =
-            (sheared(&self.corners[0]), sheared(&self.corners[1]), sheared(&self.corners[2]));
+        });
         let u = c.0 * b.1 - c.1 * b.0;
         let v = a.0 * c.1 - a.1 * c.0;
         let w = b.0 * a.1 - b.1 * a.0;
@@ -108,7 +94,7 @@ impl Block {
 }
 
 /// Distance along the ray to the triangle's plane, or `None` if it runs along it.
-#[inline(always)]
+#[inline]
 pub fn plane_distance(ray: &Ray, [a, b, c]: [DVec3; 3]) -> Option<f64> {
     let normal = (b - a).cross(c - a);
     let along = normal.dot(ray.direction);
