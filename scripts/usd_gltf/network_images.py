@@ -87,8 +87,10 @@ def _picture(read: TextureRead) -> Picture:
 
 
 def _converted(read: TextureRead, space: str) -> TextureRead:
-    """The same image in linear Rec. 709, where glTF has no name for its space."""
+    """The same image in linear Rec. 709, where glTF has no name for its space. A file that names its primaries is there already."""
     picture = read.picture or pictures.decode(read.data)
+    if picture.named:
+        return read
     texels = picture.texels.astype(np.float32).copy()
     texels[:, :, :3] = np.moveaxis(to_rec709(space, np.moveaxis(texels[:, :, :3], -1, 0)), 0, -1)
     converted = pictures.Picture(texels, linear=True, srgb=False)

@@ -4,12 +4,14 @@ import contextlib
 import math
 
 import numpy as np
+import OpenEXR
 import pytest
 from conftest import Gltf
 from networks import STANDARD, image, link, network, node
 from PIL import Image
 from pxr import Sdf, Usd, UsdShade
 from test_materials import picture, pixels
+from usd_gltf.color_spaces import to_rec709
 from usd_gltf.evaluator import Evaluator
 from usd_gltf.network_images import NetworkImages
 from usd_gltf.quantities import Lost
@@ -457,3 +459,17 @@ def test_checkers_repeat_and_gradients_do_not(gltf, export):
         out="ramp.glb",
     )
     assert "does not repeat" in result.said()
+
+
+@pytest.mark.parametrize("is_named", [False, True])
+def test_primaries_of_a_file_are_converted_once(gltf, tmp_path, is_named):
+    ap1 = (0.713, 0.293, 0.165, 0.830, 0.128, 0.044, 0.32168, 0.33767)
+    header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
+    header |= {"chromaticities": ap1} if is_named else {}
+    color = np.broadcast_to(np.array([0.5, 0.25, 0.125], np.float32), (4, 4, 3)).copy()
+    OpenEXR.File(header, {"RGB": color}).write(str(tmp_path / "a.exr"))
+    shader = node("I", "ND_image_color3", 'asset inputs:file = @a.exr@ (colorSpace = "acescg")')
+    scene = gltf(network("float inputs:base = 1\n" + link("base_color", "I"), shader))
+    code = pixels(scene, scene.material("/M")["pbrMetallicRoughness"]["baseColorTexture"])[0, 0, :3] / 255
+    expected = to_rec709("acescg", np.array([0.5, 0.25, 0.125]))
+    assert linear(code) == pytest.approx(expected, abs=6e-3)
