@@ -249,20 +249,38 @@ fn a_real_stage_is_rendered() {
     let stage = Stage::new();
     let scene = r#"#usda 1.0
 (
+    metersPerUnit = 1
     upAxis = "Y"
 )
-def RectLight "Lamp" (
+def Plane "Lamp" (
+    prepend apiSchemas = ["MaterialBindingAPI"]
     variants = { string power = "on" }
     prepend variantSets = "power"
 )
 {
-    custom bool visibleInPrimaryRay = 1
+    rel material:binding = </Lamp/Glow>
+    uniform bool doubleSided = 1
+    def Material "Glow"
+    {
+        token outputs:surface.connect = </Lamp/Glow/Surface.outputs:surface>
+        def Shader "Surface"
+        {
+            uniform token info:id = "UsdPreviewSurface"
+            color3f inputs:diffuseColor = (0, 0, 0)
+            token outputs:surface
+        }
+    }
     variantSet "power" = {
         "on" {
-            float inputs:intensity = 5
+            over "Glow"
+            {
+                over "Surface"
+                {
+                    color3f inputs:emissiveColor = (5, 5, 5)
+                }
+            }
         }
         "off" {
-            float inputs:intensity = 0
         }
     }
 }
