@@ -7,8 +7,18 @@
 """
 
 import sys
+from pathlib import Path
 
-from usd_gltf.cli import main
+try:
+    from usd_gltf.cli import main
+except ModuleNotFoundError as missing:
+    requirements = Path(__file__).resolve().parent / "requirements.txt"
+    print(
+        f"error: {sys.executable} lacks the package {missing.name}; "
+        f"`{sys.executable} -m pip install -r {requirements}` installs what the exporter needs",
+        file=sys.stderr,
+    )
+    sys.exit(1)
 
 if __name__ == "__main__":
     sys.exit(main(sys.argv[1:]))

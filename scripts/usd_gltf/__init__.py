@@ -20,7 +20,12 @@ A tour, in the order of the work:
 `mesh`, `triangulate`, `primvars`, `gprims`     geometry
 `skinning`          poses of skeletons and blend shapes
 `subdivision`, `subdivision_topology`, `subdivision_masks`, `subdivision_normals`, `subdivision_seams`   smooth surfaces
-`materials`, `preview_surface`, `textures`      looks
+`materials`, `surfaces`, `look_builder`, `textures`     looks: which surface is read, and how glTF says it
+`preview_surface`   UsdPreviewSurface
+`network_surfaces`, `surface_models`    surfaces of MaterialX and Arnold
+`shader_network`, `evaluator`, `quantities`, `network_images`   networks of shaders, and what they compute
+`shader_nodes`, `arnold_nodes`, `color_spaces`  nodes
+`materialx_layers`, `materialx_library`     `.mtlx` files, and MaterialX's own nodes
 `instancers`, `cameras`, `fog`, `transforms`, `animation`
 `gltf_document`     buffers, accessors, JSON, files
 `report`            what had no carrier, by category

@@ -11,16 +11,17 @@ from pxr import Ar, Usd
 from .report import Notebook
 
 _FORMATS = {
-    ".mtlx": ("MaterialX", "materials"), ".abc": ("Alembic", "geometry"), ".vdb": ("OpenVDB", "geometry"),
+    ".abc": ("Alembic", "geometry"), ".vdb": ("OpenVDB", "geometry"),
     ".obj": ("Wavefront OBJ", "geometry"), ".ply": ("PLY", "geometry"), ".stl": ("STL", "geometry"),
     ".fbx": ("FBX", "geometry"), ".gltf": ("glTF", "geometry"), ".glb": ("glTF", "geometry"),
     ".drc": ("Draco", "geometry"), ".bgeo": ("Houdini geometry", "geometry"), ".ass": ("Arnold", "other"),
 }  # fmt: skip
 """Formats that a USD with plugins composes: their names, and what such files mostly hold."""
+_MATERIALX = (".mtlx", ".mtlx]")
 
 
-def report_composition(stage: Usd.Stage, report: Notebook) -> None:
-    """One warning for each composition error of the stage."""
+def report_composition(stage: Usd.Stage, problems: dict[str, str], report: Notebook) -> None:
+    """One warning for each composition error of the stage. `problems` says what is wrong with files that are read here."""
     for error in stage.GetCompositionErrors():
         text = " ".join(str(error).split())
         path = error.rootSite.path
@@ -32,11 +33,13 @@ def report_composition(stage: Usd.Stage, report: Notebook) -> None:
         kind = "payload" if f"@{file}@ for payload" in text else "layer"
         _, _, reason = text.partition(" -- ")
         format_name, category = _FORMATS.get(PurePath(file).suffix.lower(), ("", "other"))
-        lines = report.about(category)
+        lines = report.about("materials" if file.lower().endswith(_MATERIALX) else category)
         if os.path.isdir(file):
             lines.warn(path, f"unreadable {kind}", f"{file} is a folder; what it should hold is left out")
         elif not _is_there(file):
             lines.warn(path, f"missing {kind}", f"{file} cannot be found; what it should hold is left out")
+        elif file in problems:
+            lines.warn(path, f"unreadable {kind}", f"{file} is there, but cannot be read: {problems[file]}; it is left out")
         elif reason.startswith("Cannot determine file format"):
             suffix = PurePath(file).suffix or "files without a suffix"
             named_format = f" ({format_name})" if format_name else ""

@@ -14,14 +14,15 @@ from .light_carriers import LightCarriers
 from .light_textures import LightTextures
 from .linking import Linking, LinkSubsets
 from .materials import Materials
+from .materialx_layers import Documents
 from .mesh import MeshReader
 from .node_writer import NodeWriter, root_node
-from .preview_surface import PreviewSurfaces
 from .prim_tree import PrimTree
 from .report import Report
 from .skinning import Skinning
 from .source_hash import Dependencies
 from .stage import Frames, Options, choose_frames, open_stage
+from .surfaces import Surfaces
 from .textures import Textures
 
 
@@ -41,7 +42,8 @@ def export(source: Path, output: Path, options: Options) -> Exported:
     report = Report()
     other = report.about("other")
     dependencies = Dependencies(source)
-    stage = open_stage(source, options, other)
+    documents = Documents(dependencies, report.about("materials"))
+    stage = open_stage(source, options, documents, other)
     frames = choose_frames(stage, options, report.about("animation"))
     meters_per_unit = UsdGeom.GetStageMetersPerUnit(stage)
     if not (math.isfinite(meters_per_unit) and meters_per_unit > 0):
@@ -51,7 +53,7 @@ def export(source: Path, output: Path, options: Options) -> Exported:
 
     document = Document(output)
     textures = Textures(document, dependencies, frames.first, report.about("materials"))
-    surfaces = PreviewSurfaces(textures, frames, report.about("materials"))
+    surfaces = Surfaces(textures, frames, meters_per_unit, report.about("materials"))
     materials = Materials(document, surfaces.read, report.about("materials"))
     skinning = Skinning(stage, frames, report.about("geometry"))
     meshes = MeshReader(document, materials, skinning, frames, options.complexity, report.about("geometry"))

@@ -50,6 +50,11 @@ class Look:
     extensions: dict = field(default_factory=dict)
     uv_names: list[str] = field(default_factory=list)
     uses_display_color: bool = True
+    color_primvar: str = "displayColor"
+    """Which primvar the display colour is."""
+    color_scale: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    color_default: tuple[float, float, float] | None = None
+    """Linear colour of meshes without another primvar than displayColor."""
     glow_is_known: bool = False
     """Whether `emission` is what the bound material says (no material says nothing)."""
 

@@ -157,7 +157,7 @@ class MeshReader:
         if self.link_subsets is not None:
             subsets += self.link_subsets.of(prim, subsets)
         bound = [self.materials.bound(p) for p in (prim, *subsets)]
-        color = self._inherited_color(prim)
+        color = self._inherited_color(prim, bound)
         source = prim.GetPrimInPrototype() if prim.IsInstanceProxy() else prim
         names = tuple(subset.GetName() for subset in subsets)
         looks = tuple(look.path for look in bound)
@@ -167,12 +167,13 @@ class MeshReader:
         return self._read[key]
 
     @staticmethod
-    def _inherited_color(prim: Usd.Prim) -> str:
+    def _inherited_color(prim: Usd.Prim, bound: list[Look]) -> str:
         """Tells apart instances that inherit different colours from outside their prototype."""
         if not prim.IsInstanceProxy():
             return ""
         api = UsdGeom.PrimvarsAPI(prim)
-        found = [api.FindPrimvarWithInheritance(name) for name in ("displayColor", "displayOpacity")]
+        names = dict.fromkeys(["displayColor", "displayOpacity", *(look.color_primvar for look in bound)])
+        found = [api.FindPrimvarWithInheritance(name) for name in names]
         return " ".join(str(p.Get()) for p in found if p and p.GetAttr().GetPrim() != prim)
 
     def _build(self, prim: Usd.Prim, subsets: list[UsdGeom.Subset], bound: list[Look]) -> MeshSource | None:
@@ -301,7 +302,7 @@ class MeshReader:
                 uv = CornerValues(np.zeros((1, 2)), np.zeros(len(corners), int))
             values[f"TEXCOORD_{number}"] = replace(uv, values=uv.values * [1, -1] + [0, 1])
         tint, translucent = None, False
-        color = self._display_color(mesh, corners) if look.uses_display_color else None
+        color = self._color(mesh, look, corners) if look.uses_display_color else None
         if color is not None:
             translucent = bool((color.values[:, 3] < 1.0).any())
             if color.constant:
@@ -320,6 +321,18 @@ class MeshReader:
         if found is not None and mesh.surface is not None:
             found = mesh.carried[name, width] = mesh.surface.carry(found)
         return found
+
+    def _color(self, mesh: Authored, look: Look, corners: np.ndarray) -> CornerValues | None:
+        """The primvar of a look's colour as linear RGBA."""
+        if look.color_primvar == "displayColor" and look.color_default is None:
+            return self._display_color(mesh, corners)
+        color = self._primvar(mesh, look.color_primvar, 3)
+        if color is None:
+            why = f"{look.path} reads primvars:{look.color_primvar}; its default is used"
+            self.report.about("materials").warn(mesh.prim.GetPath(), "mesh without the colours of its material", why)
+            color = CornerValues(np.array([look.color_default or (0.0,) * 3]), np.zeros(len(corners), int), True)
+        rgb = np.clip(color.values * look.color_scale, 0.0, 1.0)
+        return replace(color, values=np.hstack([rgb, np.full((len(rgb), 1), look.base_color[3])]))
 
     def _display_color(self, mesh: Authored, corners: np.ndarray) -> CornerValues | None:
         """displayColor and displayOpacity as linear RGBA."""

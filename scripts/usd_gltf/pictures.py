@@ -43,6 +43,8 @@ class Picture:
     """Whether UsdUVTexture's `auto` takes its colours for sRGB: codes of 8 bits in 3 or 4 channels."""
     cube: bool = False
     """Whether the file says that it is a cube map."""
+    named: bool = False
+    """Whether the file names primaries of its own, which were converted from."""
 
 
 def kind(data: bytes) -> str | None:
@@ -203,7 +205,7 @@ def _placed(part, names: list[str]) -> Picture:
     if matrix is not None:
         with np.errstate(invalid="ignore", over="ignore"):
             texels[:, :, :3] = _light(texels[:, :, :3]) @ matrix.T.astype(np.float32)
-    return Picture(_light(texels), True, False, _is_cube(part.header))
+    return Picture(_light(texels), True, False, _is_cube(part.header), matrix is not None)
 
 
 def _window(header: dict, name: str) -> tuple[tuple[int, int], tuple[int, int]]:

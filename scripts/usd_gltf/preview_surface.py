@@ -6,199 +6,43 @@ with `KHR_materials_specular` (reported: an approximation); displacement has no 
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass
-
-import numpy as np
 from pxr import Sdf, UsdShade
 
-from .gltf_document import number, numbers
+from .look_builder import LookBuilder, Value, color_of, number_of, rescaled
 from .materials import Look
 from .report import Notebook
 from .stage import Frames, changes
 from .textures import TextureRead, Textures
 
-_OTHER_CONTEXTS = ("mtlx", "arnold", "ri", "mdl", "glslfx")
-"""Render contexts whose shaders are named in the report."""
 _ONE, _ZERO = (1.0,) * 4, (0.0,) * 4
-
-
-@dataclass
-class Value:
-    """What an input reads: a constant, a texture, or the mesh's display colour."""
-
-    constant: object = None
-    texture: TextureRead | None = None
-    display_color: bool = False
-    varies: bool = False
-    """Whether `constant` is a list of one value for each frame."""
+_F0 = 0.04
+"""What a dielectric of index 1.5 reflects."""
 
 
 class PreviewSurfaces:
-    """Reads materials; `Materials` keeps the looks."""
+    """Reads UsdPreviewSurface shaders."""
 
-    def __init__(self, textures: Textures, frames: Frames, report: Notebook) -> None:
-        self.textures, self.frames, self.report = textures, frames, report
+    def __init__(self, textures: Textures, builder: LookBuilder, frames: Frames, report: Notebook) -> None:
+        self.textures, self.builder, self.frames, self.report = textures, builder, frames, report
         self.code = frames.first
 
-    def read(self, material: UsdShade.Material) -> Look:
-        """The look of a material; unknown shaders are reported and look like no material."""
-        path = material.GetPath()
-        shader, _, _ = material.ComputeSurfaceSource()
-        name = str(shader.GetIdAttr().Get() or "") if shader else ""
-        if name != "UsdPreviewSurface":
-            for context in _OTHER_CONTEXTS if not shader else ():
-                shader, _, _ = material.ComputeSurfaceSource(context)
-                if shader:
-                    name = str(shader.GetIdAttr().Get() or "")
-                    break
-            what = f"surface shader {name}" if name else "material without a surface shader"
-            self.report.warn(path, what, "only UsdPreviewSurface is read; display colour or grey is used")
-            return Look(path=str(path))
-        return self._look(str(path), shader)
+    def look(self, path: str, shader: UsdShade.Shader) -> Look:
+        """The look of a surface."""
+        return self.look_of(path, {name: self._value(path, shader, name) for name in INPUTS})
 
-    # -- one surface -----------------------------------------------------------------------------
-
-    def _look(self, path: str, shader: UsdShade.Shader) -> Look:
-        look = Look(path=path, uses_display_color=False, glow_is_known=True)
-        read = {name: self._value(path, shader, name) for name in _DEFAULTS}
-        specular_workflow = bool(self._number(read["useSpecularWorkflow"], 0.0))
-        self._base(look, read)
-        self._metallic_roughness(look, read, specular_workflow)
-        self._emission(look, read)
-        self._normal_and_occlusion(look, read)
+    def look_of(self, path: str, read: dict[str, Value]) -> Look:
+        """The look of a surface whose inputs are read already."""
+        specular_workflow = bool(number_of(read["useSpecularWorkflow"], 0.0))
         if specular_workflow:
-            color = self._color(read["specularColor"], (0.0, 0.0, 0.0))
-            f0 = max(color)
-            look.extensions["KHR_materials_specular"] = {
-                "specularFactor": 1.0,
-                "specularColorFactor": numbers([c / 0.04 for c in color]),
-            }
-            why = "it becomes a dielectric with a specular colour" + (
-                "; its texture is lost" if read["specularColor"].texture else ""
-            )
-            self.report.warn(path, "specular workflow", f"{why} (F0 up to {f0:g})")
-        ior = self._number(read["ior"], 1.5)
-        if ior != 1.5 and (ior >= 1.0 or ior == 0.0):
-            look.extensions["KHR_materials_ior"] = {"ior": number(ior)}
-        clearcoat = self._number(read["clearcoat"], 0.0)
-        if clearcoat > 0:
-            roughness = self._number(read["clearcoatRoughness"], 0.01)
-            look.extensions["KHR_materials_clearcoat"] = {
-                "clearcoatFactor": number(min(clearcoat, 1.0)),
-                "clearcoatRoughnessFactor": number(min(max(roughness, 0.0), 1.0)),
-            }
-        if read["clearcoat"].texture or read["clearcoatRoughness"].texture:
-            self.report.warn(path, "clearcoat texture", "its constant value is used")
-        if read["displacement"].texture or self._number(read["displacement"], 0.0) != 0.0:
+            value = read["specularColor"]
+            color = color_of(value, (0.0, 0.0, 0.0))
+            tint = Value(tuple(c / _F0 for c in color), value.texture and rescaled(value.texture, 1 / _F0))
+            read = {**read, "specularTint": tint}
+            self.report.warn(path, "specular workflow", f"it becomes a dielectric with a specular colour (F0 up to {max(color):g})")
+        look = self.builder.look(path, read, is_dielectric=specular_workflow)
+        if read["displacement"].texture or number_of(read["displacement"], 0.0) != 0.0:
             self.report.warn(path, "displacement", "it has no carrier")
         return look
-
-    def _base(self, look: Look, read: dict[str, Value]) -> None:
-        """baseColor from diffuseColor and opacity, and the alpha mode."""
-        diffuse, opacity = read["diffuseColor"], read["opacity"]
-        threshold = self._number(read["opacityThreshold"], 0.0)
-        look.uses_display_color = diffuse.display_color
-        alpha = self._number(opacity, 1.0)
-        if threshold > 0.0:
-            look.alpha_mode, look.alpha_cutoff = "MASK", threshold
-        elif opacity.texture or alpha < 1.0:
-            look.alpha_mode = "BLEND"
-        color, mask = diffuse.texture, opacity.texture
-        constant = (1.0, 1.0, 1.0) if diffuse.display_color else self._color(diffuse, (0.18, 0.18, 0.18))
-        if color is None and mask is None:
-            look.base_color = (*constant, alpha)
-            return
-        main = color or mask
-        same = mask is None or (mask.data == main.data and mask.channel == "a" and mask.bias[3] == 0)
-        scales = [*main.scale[:3], mask.scale[3] if mask else alpha]
-        fits = all(0 <= s <= 1 for s in scales) and (mask is not None or look.alpha_mode == "OPAQUE")
-        if color is not None and color.is_plain("rgb", srgb=True) and same and fits:
-            image = self.textures.plain(color)
-            look.base_color = tuple(scales)
-        else:
-            planes = [(color, c) for c in _rgb(color)] if color else [float(c) for c in constant]
-            planes.append((mask, mask.channel[0]) if mask else float(alpha))
-            image = self.textures.packed(f"{_stem(main)}_base", planes, srgb=True)
-            look.base_color = (1.0, 1.0, 1.0, 1.0)
-        self._same_mapping(look.path, color, mask)
-        look.base_texture = self._info(look, main, image)
-
-    def _metallic_roughness(self, look: Look, read: dict[str, Value], specular_workflow: bool) -> None:
-        """Roughness in green, metalness in blue."""
-        rough, metal = read["roughness"].texture, None if specular_workflow else read["metallic"].texture
-        roughness = min(max(self._number(read["roughness"], 0.5), 0.0), 1.0)
-        metallic = 0.0 if specular_workflow else min(max(self._number(read["metallic"], 0.0), 0.0), 1.0)
-        look.roughness, look.metallic = roughness, metallic
-        if rough is None and metal is None:
-            return
-        main = rough or metal
-        as_is = (
-            (rough is None or (rough.is_plain("g", srgb=False) and 0 <= rough.scale[1] <= 1))
-            and (metal is None or (metal.is_plain("b", srgb=False) and 0 <= metal.scale[2] <= 1))
-            and (rough is None or metal is None or rough.data == metal.data)
-            and (rough is not None)
-            and (metal is not None or metallic == 0.0)
-        )
-        if as_is:
-            image = self.textures.plain(main)
-            look.roughness = rough.scale[1]
-            look.metallic = metal.scale[2] if metal else 0.0
-        else:
-            planes = [
-                1.0,
-                (rough, rough.channel[0]) if rough else float(roughness),
-                (metal, metal.channel[0]) if metal else float(metallic),
-                1.0,
-            ]
-            image = self.textures.packed(f"{_stem(main)}_roughness_metallic", planes, srgb=False)
-            look.roughness, look.metallic = 1.0, 1.0
-        self._same_mapping(look.path, rough, metal)
-        look.metallic_roughness_texture = self._info(look, main, image)
-
-    def _emission(self, look: Look, read: dict[str, Value]) -> None:
-        emissive = read["emissiveColor"]
-        texture = emissive.texture
-        if texture is None:
-            keys = emissive.constant if emissive.varies else [emissive.constant]
-            rows = [self._color(Value(key), (0.0, 0.0, 0.0), limit=math.inf) for key in keys]
-            look.emission = rows[0]
-            look.emission_keys = np.array(rows) if emissive.varies else None
-            return
-        if texture.is_plain("rgb", srgb=True) and min(texture.scale[:3]) >= 0 and "black" not in texture.wraps:
-            image = self.textures.plain(texture)
-            look.emission = texture.scale[:3]
-        else:
-            planes = [(texture, c) for c in _rgb(texture)]
-            image, factor = self.textures.baked(look.path, f"{_stem(texture)}_emission", planes)
-            look.emission = tuple(float(f) for f in factor)
-        look.emission_texture = self._info(look, texture, image)
-
-    def _normal_and_occlusion(self, look: Look, read: dict[str, Value]) -> None:
-        normal, occlusion = read["normal"].texture, read["occlusion"].texture
-        if normal is not None:
-            standard = normal.scale[:3] == (2.0,) * 3 and normal.bias[:3] == (-1.0,) * 3
-            if standard and normal.channel == "rgb" and normal.color_space != "sRGB":
-                image = self.textures.plain(normal)
-            else:
-                planes = [(_rescaled(normal, 0.5, 0.5), c) for c in _rgb(normal)]
-                image = self.textures.packed(f"{_stem(normal)}_normal", [*planes, 1.0], srgb=False)
-            look.normal_texture = self._info(look, normal, image)
-        if occlusion is not None:
-            if occlusion.is_plain("r", srgb=False) and occlusion.scale[0] == 1.0:
-                image = self.textures.plain(occlusion)
-            else:
-                planes = [(occlusion, occlusion.channel[0]), 1.0, 1.0, 1.0]
-                image = self.textures.packed(f"{_stem(occlusion)}_occlusion", planes, srgb=False)
-            look.occlusion_texture = self._info(look, occlusion, image)
-
-    def _info(self, look: Look, read: TextureRead, image: int) -> dict:
-        return self.textures.info(look.path, read, image, look.uv_names)
-
-    def _same_mapping(self, path: str, a: TextureRead | None, b: TextureRead | None) -> None:
-        if a and b and (a.uv_name, a.transform, a.wraps) != (b.uv_name, b.transform, b.wraps):
-            why = "glTF reads both from one image with one mapping; the first one's is used"
-            self.report.warn(path, "textures with different mappings", why)
 
     # -- inputs ----------------------------------------------------------------------------------
 
@@ -289,44 +133,10 @@ class PreviewSurfaces:
             break
         return "st", transform
 
-    @staticmethod
-    def _number(value: Value, fallback: float) -> float:
-        try:
-            found = float(value.constant)
-        except (TypeError, ValueError):
-            return fallback
-        return found if math.isfinite(found) else fallback
 
-    @staticmethod
-    def _color(value: Value, fallback: tuple, limit: float = 1.0) -> tuple[float, float, float]:
-        try:
-            r, g, b = (float(c) for c in value.constant)
-        except (TypeError, ValueError):
-            return fallback
-        if not all(map(math.isfinite, (r, g, b))):
-            return fallback
-        return tuple(min(max(c, 0.0), limit) for c in (r, g, b))
-
-
-_DEFAULTS = (
+INPUTS = (
     "diffuseColor", "emissiveColor", "useSpecularWorkflow", "specularColor", "metallic", "roughness",
     "clearcoat", "clearcoatRoughness", "opacity", "opacityThreshold", "ior", "normal", "displacement",
     "occlusion",
 )  # fmt: skip
-
-
-def _rgb(read: TextureRead) -> str:
-    """The channels that feed a colour."""
-    return "rgb" if read.channel == "rgb" else read.channel * 3
-
-
-def _stem(read: TextureRead) -> str:
-    return read.name.rsplit(".", 1)[0]
-
-
-def _rescaled(read: TextureRead, factor: float, shift: float = 0.0) -> TextureRead:
-    """The same read with all its values times `factor` plus `shift`."""
-    fields = dict(vars(read))
-    fields["scale"] = tuple(s * factor for s in read.scale)
-    fields["bias"] = tuple(b * factor + shift for b in read.bias)
-    return TextureRead(**fields)
+"""The inputs that are read."""

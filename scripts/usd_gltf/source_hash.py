@@ -58,6 +58,8 @@ class Dependencies:
                 self._add_layer(layer.realPath)
             named = [*layer.GetCompositionAssetDependencies(), *layer.GetExternalAssetDependencies()]
             for path in filter(None, named):
+                if Sdf.Layer.IsAnonymousLayerIdentifier(path):
+                    continue  # made in memory of a file that was read
                 anchored = Sdf.ComputeAssetPathRelativeToLayer(layer, path)
                 resolved = str(Ar.GetResolver().Resolve(anchored))
                 if resolved:

@@ -6,12 +6,16 @@ import math
 import re
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from pxr import Sdf, Tf, Usd, UsdGeom
 
 from .composition import report_composition
 from .report import ExportError, Notebook
+
+if TYPE_CHECKING:
+    from .materialx_layers import Documents
 
 PREDICATE = Usd.TraverseInstanceProxies(
     Usd.PrimIsActive & Usd.PrimIsDefined & Usd.PrimIsLoaded & ~Usd.PrimIsAbstract
@@ -73,7 +77,7 @@ def changes(attribute: Usd.Attribute, frames: Frames) -> bool:
     return any(attribute.Get(code) != first for code in frames.codes[1:])
 
 
-def open_stage(path: Path, options: Options, report: Notebook) -> Usd.Stage:
+def open_stage(path: Path, options: Options, documents: Documents, report: Notebook) -> Usd.Stage:
     """Open with all payloads, set the variants, populate the mask, and report what did not compose.
 
     With a mask only its prims are there, what is above and below them, and what they need to look right: all that
@@ -89,14 +93,17 @@ def open_stage(path: Path, options: Options, report: Notebook) -> Usd.Stage:
             stage = Usd.Stage.Open(str(path), Usd.Stage.LoadAll)
     except (Tf.ErrorException, RuntimeError) as error:
         raise ExportError(f"{path}: USD cannot read it: {first_line(error, path)}") from None
+    documents.compose(stage)
     for prim_path, variant_set, selection in options.variants:
         _select_variant(stage, path, prim_path, variant_set, selection)
+        documents.compose(stage)
     for prim_path in options.mask:
         if not stage.GetPrimAtPath(prim_path):
             raise ExportError(f"{path}: --mask: {_no_prim(path, prim_path)}")
     if options.mask:
         stage.ExpandPopulationMask(lambda link: not link.GetName().startswith("collection:") and link.GetName() != "proxyPrim")
-    report_composition(stage, report)
+        documents.compose(stage)
+    report_composition(stage, documents.problems, report)
     return stage
 
 

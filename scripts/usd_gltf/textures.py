@@ -114,7 +114,7 @@ class Textures:
         texels = np.zeros((rows * side, columns * side, 4), np.float32)
         for (u, v), tile in tiles.items():
             top, start = (high - v) * side, (u - left) * side
-            planes = [_resized(tile.texels[:, :, c], side, side) for c in range(4)]
+            planes = [resized(tile.texels[:, :, c], side, side) for c in range(4)]
             texels[top : top + side, start : start + side] = np.stack(planes, axis=2)
         what = f"{path}: {len(tiles)} tiles become one image"
         if side < full:
@@ -204,7 +204,7 @@ class Textures:
         values = [plane if isinstance(plane, float) else self._values(*plane, srgb) for plane in planes]
         shapes = [v.shape for v in values if isinstance(v, np.ndarray)]
         height, width = max(s[0] for s in shapes), max(s[1] for s in shapes)
-        return np.stack([_resized(v, height, width) for v in values], axis=2)
+        return np.stack([resized(v, height, width) for v in values], axis=2)
 
 
 def flipped_transform(rotation_deg: float, sx: float, sy: float, tx: float, ty: float) -> dict:
@@ -218,7 +218,7 @@ def flipped_transform(rotation_deg: float, sx: float, sy: float, tx: float, ty: 
     return {"offset": numbers(offset), "rotation": number(angle), "scale": numbers((sx, sy))}
 
 
-def _resized(plane: np.ndarray | float, height: int, width: int) -> np.ndarray:
+def resized(plane: np.ndarray | float, height: int, width: int) -> np.ndarray:
     """A plane at the common size, or a constant plane. Smaller sizes average, so light is kept."""
     if isinstance(plane, float):
         return np.full((height, width), plane)

@@ -9,8 +9,8 @@ use super::build::{Rebuilt, build_tree, rebuild_tree};
 use super::fresh::{OpenedTree, TreeError, check_output, open_base};
 use super::read::read_scene;
 use super::{
-    Event, ReadError, ShotTrees, Strict, Survey, TreeChoice, Watch, collect_emitters, frames_of,
-    survey, with_trees,
+    Event, ReadError, ShotTrees, StageOptions, Strict, Survey, TreeChoice, Watch, collect_emitters,
+    frames_of, survey, with_trees,
 };
 use crate::emitter::{Emitters, LightOverflow};
 use crate::light_tree::LightTree;
@@ -24,8 +24,10 @@ use std::time::{Duration, Instant};
 /// What to build.
 #[derive(Clone, Debug, Default)]
 pub struct BuildJob {
-    /// The scene: `.gltf`, `.glb` or `.obj`.
+    /// The scene: `.gltf`, `.glb` or `.obj`, or a USD stage.
     pub scene: PathBuf,
+    /// What of a USD stage is meant.
+    pub stage: StageOptions,
     /// The tree file to write; the scene's name with `.ltree` if not given.
     pub output: Option<PathBuf>,
     /// Frames to build for, if lights change; the scene's own if not given.
@@ -147,6 +149,13 @@ pub enum BuildError {
     Stopped,
 }
 
+impl BuildError {
+    /// Whether the options are at fault, whatever is in the scene.
+    pub fn is_usage(&self) -> bool {
+        matches!(self, BuildError::Read(error) if error.is_usage())
+    }
+}
+
 /// An earlier tree file, opened.
 struct Base {
     path: PathBuf,
@@ -257,7 +266,12 @@ impl BuildJob {
 
     /// Reads the scene, and sees whether it can be built there.
     fn load(&self, output: &Path, watch: &dyn Watch) -> Result<Scene, BuildError> {
-        let scene = read_scene(&self.scene, self.strict.as_ref(), &self.force_light, watch)?;
+        let read =
+            read_scene(&self.scene, &self.stage, self.strict.as_ref(), &self.force_light, watch);
+        let scene = read.map_err(|error| match error.is_stop() {
+            true => BuildError::Stopped,
+            false => error.into(),
+        })?;
         let real = |path: &Path| path.canonicalize().ok();
         let is_output = |input: &Path| real(input).is_some() && real(input) == real(output);
         if scene.files.iter().any(|file| is_output(&file.path)) {

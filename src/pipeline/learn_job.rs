@@ -4,8 +4,8 @@ use super::learn_budget::{Budget, Trials};
 use super::learned::{LearnedError, open_learned};
 use super::read::read_scene;
 use super::{
-    ASPECT, Event, ReadError, Strict, TreeChoice, TreeError, View, ViewError, Watch, frames_of,
-    look, option, view_keys, with_trees,
+    ASPECT, Event, ReadError, StageOptions, Strict, TreeChoice, TreeError, View, ViewError, Watch,
+    frames_of, look, option, view_keys, with_trees,
 };
 use crate::learn::{LearnOptions, Lesson, learn};
 use crate::light_tree::NoSuchFrame;
@@ -26,8 +26,10 @@ const HEIGHT: u32 = 720;
 /// What to learn.
 #[derive(Clone, Debug, Default)]
 pub struct LearnJob {
-    /// The scene: `.gltf`, `.glb` or `.obj`.
+    /// The scene: `.gltf`, `.glb` or `.obj`, or a USD stage.
     pub scene: PathBuf,
+    /// What of a USD stage is meant.
+    pub stage: StageOptions,
     /// Its light tree; without one, trees are built in memory.
     pub tree: Option<PathBuf>,
     /// The frames that will be rendered; the scene's own if not given. A few of them are looked at.
@@ -92,6 +94,13 @@ pub enum LearnError {
     Stopped,
 }
 
+impl LearnError {
+    /// Whether the options are at fault, whatever is in the scene.
+    pub fn is_usage(&self) -> bool {
+        matches!(self, LearnError::Read(error) if error.is_usage())
+    }
+}
+
 impl LearnJob {
     /// Learns, and writes the table.
     ///
@@ -106,7 +115,12 @@ impl LearnJob {
         }
         let stage = |name: &str| watch.tell(Event::Stage { name: name.into() });
         stage("reading the scene");
-        let mut scene = read_scene(&self.scene, self.strict.as_ref(), &self.force_lights, watch)?;
+        let (stage_options, strict) = (&self.stage, self.strict.as_ref());
+        let read = read_scene(&self.scene, stage_options, strict, &self.force_lights, watch);
+        let mut scene = read.map_err(|error| match error.is_stop() {
+            true => LearnError::Stopped,
+            false => error.into(),
+        })?;
         let found = look(&mut scene, &self.view, ASPECT)?;
         found.note.into_iter().for_each(|text| watch.tell(Event::Note { text }));
         let camera = found.camera;

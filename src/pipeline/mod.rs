@@ -5,7 +5,7 @@
 //!
 //! | stage | question |
 //! |---|---|
-//! | [`load_scene`], [`force_lights`], [`Strict`] | what is in the file, and is it good enough? |
+//! | [`load_scene`], [`StageOptions`], [`force_lights`], [`Strict`] | what is in the file, or the USD stage, and is it good enough? |
 //! | [`look()`] | which camera does the user mean? |
 //! | [`collect_emitters`], [`survey()`] | what shines, and what do its trees depend on? |
 //! | [`build_tree`], [`rebuild_tree`] | the trees of a shot, anew or upon an earlier file |
@@ -33,6 +33,7 @@ mod read;
 mod render_job;
 mod rig;
 mod shot_trees;
+mod stage;
 mod stamp;
 mod strict;
 mod survey;
@@ -65,6 +66,7 @@ pub use render_job::{
 };
 pub use rig::carry_camera;
 pub use shot_trees::{ShotTrees, TreeChoice, TreeFile, with_trees};
+pub use stage::{StageError, StageOptions};
 pub use stamp::{PreviewStamp, Stamp, Stamper};
 pub use strict::{Strict, StrictError};
 pub use survey::{Group, PlacedLight, SharedBounds, Survey, SurveyedFrame, survey};

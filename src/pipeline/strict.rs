@@ -1,6 +1,7 @@
 //! Notes that the user wants treated as errors.
 
 use crate::scene::{Category, Scene};
+use std::fmt;
 use std::path::PathBuf;
 use std::str::FromStr;
 
@@ -45,6 +46,12 @@ impl Strict {
     }
 }
 
+impl fmt::Display for Strict {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        f.write_str(&self.0.iter().map(Category::to_string).collect::<Vec<_>>().join(","))
+    }
+}
+
 impl FromStr for Strict {
     type Err = String;
 
@@ -68,6 +75,7 @@ mod tests {
         let error = check("lights,cameras").unwrap_err();
         assert_eq!((error.count, &error.categories[..]), (2, &[Category::Cameras][..]));
         assert_eq!(check(Strict::EVERYTHING).unwrap_err().count, 3);
+        assert_eq!("lights,other".parse::<Strict>().unwrap().to_string(), "lights,other");
         assert!("lights,".parse::<Strict>().is_err() && "".parse::<Strict>().is_err());
         assert_eq!(Strict::EVERYTHING, Category::ALL.map(Category::name).join(","));
     }

@@ -21,6 +21,7 @@ mod pages;
 mod probe;
 mod render;
 mod resume;
+mod stage;
 mod trees;
 mod verify;
 mod views;

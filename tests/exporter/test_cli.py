@@ -203,7 +203,7 @@ def test_a_light_that_is_hidden_over_time_is_a_matter_of_lights(export, light):
 
 
 FILES = {
-    "x.mtlx": ('<?xml version="1.0"?><materialx version="1.38"/>', "is there, but this USD has no plugin for .mtlx (MaterialX)", "materials"),
+    "x.mtlx": ('<?xml version="1.0"?><materialx', "is there, but cannot be read", "materials"),
     "x.abc": ("Ogawa", "is there, but this USD has no plugin for .abc (Alembic)", "geometry"),
     "x.vdb": ("VDB", "is there, but this USD has no plugin for .vdb (OpenVDB)", "geometry"),
     "x.xyz": ("1 2 3", "is there, but this USD has no plugin for .xyz", "other"),

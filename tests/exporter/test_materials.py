@@ -273,9 +273,10 @@ def test_the_specular_workflow_is_approximated_and_reported(export):
     assert "specular workflow" in result.warned()
 
 
-def test_unknown_shaders_are_reported_and_look_like_display_color(export):
+@pytest.mark.parametrize("name", ["PxrSurface", "ND_surface", "ND_gone_surfaceshader", "arnold:standard_hair", ""])
+def test_unknown_shaders_are_reported_and_look_like_display_color(export, name):
     from conftest import Gltf
 
-    result = export(surface("", shader_id="ND_standard_surface_surfaceshader"))
-    assert "surface shader ND_standard_surface_surfaceshader" in result.warned()
+    result = export(surface("", shader_id=name))
+    assert (f"surface shader {name}" if name else "material without a surface shader") in result.warned()
     assert Gltf(result.path).material("/M")["pbrMetallicRoughness"]["baseColorFactor"][0] == 0.5

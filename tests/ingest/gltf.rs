@@ -1,7 +1,9 @@
 //! What glTF can say, compiled.
 
 use crate::files::{lamp, png};
-use candelabra::scene::{AlphaMode, Channel, Interpolation, LightKind, Pixels, Trs, Wrap};
+use candelabra::scene::{
+    AlphaMode, Channel, Interpolation, LightKind, Pixels, TextureUse, Trs, Wrap,
+};
 use candelabra::scene::{Note, Shaping};
 use glam::{DVec3, Vec2, Vec3, Vec4};
 use serde_json::json;
@@ -202,6 +204,66 @@ fn materials_are_compiled() {
     assert!(material.double_sided && !material.emits());
     let told: Vec<String> = scene.notes.iter().map(ToString::to_string).collect();
     assert_eq!(told, ["materials: material 0: KHR_materials_clearcoat is not read"]);
+}
+
+#[test]
+fn specular_and_glossiness_are_a_dielectric_of_the_same_reflection() {
+    let mut file = lamp();
+    let extension = "KHR_materials_pbrSpecularGlossiness";
+    file.json["materials"][0] = json!({"extensions": {extension: {
+        "diffuseFactor": [0.8, 0.4, 0.2, 0.5], "specularFactor": [0.52, 0.28, 0.04], "glossinessFactor": 0.75,
+    }}});
+    let scene = file.load().unwrap();
+    let material = &scene.materials[0];
+    // (1 - 0.52) / (1 - 0.04) is one half.
+    assert!(material.base_color.abs_diff_eq(Vec3::new(0.4, 0.2, 0.1), 1e-6), "{material:?}");
+    assert!(material.specular_color.abs_diff_eq(Vec3::new(13.0, 7.0, 1.0), 1e-4), "{material:?}");
+    assert_eq!((material.opacity, material.roughness, material.metallic), (0.5, 0.25, 0.0));
+    assert_eq!(scene.notes, NO_NOTES);
+}
+
+#[test]
+fn textures_of_specular_and_glossiness_are_read_each_texel_by_its_own() {
+    let mut file = lamp();
+    let extension = "KHR_materials_pbrSpecularGlossiness";
+    let pictures =
+        [[188, 188, 188, 255], [255, 188, 0, 51]].map(|color| file.view(&png(2, 3, color)));
+    for (number, picture) in pictures.into_iter().enumerate() {
+        file.add("images", json!({"bufferView": picture, "mimeType": "image/png"}));
+        file.add("textures", json!({"source": number}));
+    }
+    let uv = file.floats(&[0.0, 0.0, 1.0, 0.0, 0.0, 1.0], "VEC2");
+    file.attribute("TEXCOORD_0", uv);
+    let glossy = json!({
+        "diffuseTexture": {"index": 0}, "specularGlossinessTexture": {"index": 1}, "specularFactor": [0.5, 0.5, 0.5],
+    });
+    file.json["materials"][0] = json!({"extensions": {extension: glossy}});
+    let scene = file.load().unwrap();
+    let material = &scene.materials[0];
+    let texel =
+        |used: Option<TextureUse>| scene.textures[used.unwrap().texture as usize].texel(0, 0);
+    let tint = texel(material.specular_color_texture).truncate() * material.specular_color * 0.04;
+    assert!(tint.abs_diff_eq(Vec3::new(0.5, 0.25, 0.0), 2e-3), "{tint}");
+    let rough = texel(material.metallic_roughness_texture).y * material.roughness;
+    assert!((rough - 0.8).abs() < 3e-3, "{rough}");
+    let base = texel(material.base_color_texture).x * material.base_color.x;
+    assert!((base - 0.5 * 0.5 / 0.96).abs() < 5e-3, "{base}");
+    assert_eq!(scene.notes, NO_NOTES);
+    // Without a diffuse texture the diffuse part is the factor's.
+    let of_material = &mut file.json["materials"][0]["extensions"][extension];
+    of_material.as_object_mut().unwrap().remove("diffuseTexture");
+    of_material["diffuseFactor"] = json!([0.2, 0.2, 0.2, 1.0]);
+    let scene = file.load().unwrap();
+    let material = &scene.materials[0];
+    let used = material.base_color_texture.unwrap().texture as usize;
+    let base = scene.textures[used].texel(0, 0).x * material.base_color.x;
+    assert!((base - 0.2 * 0.5 / 0.96).abs() < 5e-3, "{base}");
+    // Where they do not lie alike, that is said.
+    let of_material = &mut file.json["materials"][0]["extensions"][extension];
+    of_material["diffuseTexture"] = json!({"index": 0, "texCoord": 1});
+    let scene = file.load().unwrap();
+    let told: Vec<String> = scene.notes.iter().map(ToString::to_string).collect();
+    assert!(told.iter().any(|note| note.contains("different coordinates")), "{told:?}");
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! The command line.
 
 use crate::display::Progress;
-use candelabra::pipeline::{Effort, Preview, RenderJob, Strict, View, option};
+use candelabra::pipeline::{Effort, Preview, RenderJob, StageOptions, Strict, View, option};
 use candelabra::render::frame_names::FrameNames;
 use candelabra::render::frames::Frames;
 use candelabra::render::noise::Grey;
@@ -20,7 +20,7 @@ use std::path::PathBuf;
 #[derive(Parser)]
 #[command(version, arg_required_else_help = true)]
 pub struct Arguments {
-    /// The scene: .gltf, .glb or .obj
+    /// The scene: .gltf, .glb or .obj, or a USD stage
     pub scene: PathBuf,
     /// Its light tree, from `candelabra build`; built in memory if not given
     #[arg(long)]
@@ -125,6 +125,8 @@ pub struct Arguments {
     #[arg(long, value_name = "CATEGORIES", num_args = 0..=1, require_equals = true, default_missing_value = Strict::EVERYTHING)]
     pub strict: Option<Strict>,
     #[command(flatten)]
+    pub stage: StageOptions,
+    #[command(flatten)]
     pub progress: Progress,
     /// Print at the end where time and memory went, as text or JSON
     #[arg(long, value_enum, num_args = 0..=1, require_equals = true, default_missing_value = "text")]
@@ -179,6 +181,7 @@ impl Arguments {
     pub fn job(&self) -> RenderJob {
         RenderJob {
             scene: self.scene.clone(),
+            stage: self.stage.clone(),
             tree: self.tree.clone(),
             learned: self.learned.clone(),
             frames: self.frames.clone(),

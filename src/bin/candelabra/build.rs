@@ -5,7 +5,9 @@ use crate::stderr::say;
 use crate::stop::{STOPPED, Stop};
 use anyhow::Result;
 use candelabra::page::{Lines, counted};
-use candelabra::pipeline::{BreakEven, BuildError, BuildJob, BuildReport, Built, Strict};
+use candelabra::pipeline::{
+    BreakEven, BuildError, BuildJob, BuildReport, Built, StageOptions, Strict,
+};
 use candelabra::render::frames::Frames;
 use clap::Args;
 use std::io::Write;
@@ -15,7 +17,7 @@ use std::time::Duration;
 
 #[derive(Args)]
 pub struct Arguments {
-    /// The scene: .gltf, .glb or .obj
+    /// The scene: .gltf, .glb or .obj, or a USD stage
     scene: PathBuf,
     /// The tree file to write; the scene's name with .ltree if not given
     #[arg(short, long)]
@@ -43,6 +45,8 @@ pub struct Arguments {
     #[arg(long, value_name = "CATEGORIES", num_args = 0..=1, require_equals = true, default_missing_value = Strict::EVERYTHING)]
     strict: Option<Strict>,
     #[command(flatten)]
+    stage: StageOptions,
+    #[command(flatten)]
     progress: Progress,
 }
 
@@ -53,6 +57,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     let Arguments { scene, output, frames, force_light, base, force, strict, .. } = arguments;
     let job = BuildJob {
         scene: scene.clone(),
+        stage: arguments.stage.clone(),
         output: output.clone(),
         frames: frames.clone(),
         force_light: force_light.clone(),

@@ -5,7 +5,7 @@ use crate::stderr::say;
 use crate::stop::{STOPPED, Stop};
 use anyhow::Result;
 use candelabra::page::{Lines, counted};
-use candelabra::pipeline::{Budget, LearnError, LearnJob, Strict, View, option};
+use candelabra::pipeline::{Budget, LearnError, LearnJob, StageOptions, Strict, View, option};
 use candelabra::render::frames::Frames;
 use clap::Args;
 use std::io::Write;
@@ -14,7 +14,7 @@ use std::process::ExitCode;
 
 #[derive(Args)]
 pub struct Arguments {
-    /// The scene: .gltf, .glb or .obj
+    /// The scene: .gltf, .glb or .obj, or a USD stage
     scene: PathBuf,
     /// Its light tree, from `candelabra build`; built in memory if not given
     #[arg(long)]
@@ -45,6 +45,8 @@ pub struct Arguments {
     #[arg(long, value_name = "CATEGORIES", num_args = 0..=1, require_equals = true, default_missing_value = Strict::EVERYTHING)]
     strict: Option<Strict>,
     #[command(flatten)]
+    stage: StageOptions,
+    #[command(flatten)]
     progress: Progress,
 }
 
@@ -60,6 +62,7 @@ pub fn run(arguments: &Arguments) -> Result<ExitCode> {
     }
     let job = LearnJob {
         scene: arguments.scene.clone(),
+        stage: arguments.stage.clone(),
         tree: arguments.tree.clone(),
         frames: arguments.frames.clone(),
         view: arguments.view.clone(),

@@ -21,7 +21,7 @@ mod stop;
 mod texture_bar;
 mod verify;
 
-use candelabra::pipeline::ViewError;
+use candelabra::pipeline::{BuildError, LearnError, ViewError};
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
 
@@ -94,6 +94,8 @@ fn main() -> ExitCode {
                 Command::Diff(_) | Command::Verify(_) => diff::TROUBLE.into(),
                 _ if run::is_usage(&error) => USAGE.into(),
                 _ if error.downcast_ref().is_some_and(ViewError::is_usage) => USAGE.into(),
+                _ if error.downcast_ref().is_some_and(BuildError::is_usage) => USAGE.into(),
+                _ if error.downcast_ref().is_some_and(LearnError::is_usage) => USAGE.into(),
                 _ => ExitCode::FAILURE,
             }
         }

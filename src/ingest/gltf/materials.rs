@@ -5,6 +5,7 @@
 //! emission, which would be far too bright without its texture.
 
 use super::document::label;
+use super::glossiness;
 use super::textures::Textures;
 use super::{Output, Source};
 use crate::ingest::image::{Coding, MISSING_REFLECTANCE};
@@ -16,19 +17,21 @@ use gltf::json::validation::Checked;
 use gltf::json::{Index, Material as Row};
 use std::cell::Cell;
 
-/// Reflectance at normal incidence of the default dielectric: index of refraction 1.5.
-const DEFAULT_REFLECTANCE: f32 = 0.04;
-
 /// The materials that were compiled, by their number in the file.
 pub(super) struct Materials {
     compiled: Vec<Option<u32>>,
     textures: Textures,
+    glossy: glossiness::Computed,
 }
 
 impl Materials {
     pub(super) fn new(source: &Source) -> Materials {
         let compiled = vec![None; source.document.materials.len()];
-        Materials { compiled, textures: Textures::default() }
+        Materials {
+            compiled,
+            textures: Textures::default(),
+            glossy: glossiness::Computed::default(),
+        }
     }
 
     /// The scene's number of a material of the file; `None` if it is not there, which is noted.
@@ -107,7 +110,7 @@ impl Materials {
             let diffuse = glossy.diffuse_factor.0.map(|part| within(part, 0.0, 1.0, 1.0));
             let specular = glossy.specular_factor.0.map(|part| within(part, 0.0, 1.0, 1.0));
             let gloss = within(glossy.glossiness_factor.0, 0.0, 1.0, 1.0);
-            approximate_glossiness(&mut material, diffuse, specular, gloss);
+            glossiness::put_factors(&mut material, diffuse, specular, gloss);
         }
         if mended.get() {
             let text = "has parameters out of their range; brought into it";
@@ -195,24 +198,28 @@ impl Materials {
         let map = source.document.beside.normal_maps[number].as_ref();
         (material.normal_texture, _) =
             texture(map, Coding::Linear, "its surfaces are drawn without a normal map");
-        let glossy = extensions.pbr_specular_glossiness.as_ref();
-        let base = match glossy {
-            Some(glossy) => glossy.diffuse_texture.as_ref(),
-            None => pbr.base_color_texture.as_ref(),
-        };
-        let (base, is_missing) = texture(base, Coding::Srgb, "its base colour is grey instead");
+        if let Some(glossy) = &extensions.pbr_specular_glossiness {
+            return self.glossy.put_textures(
+                &mut self.textures,
+                source,
+                output,
+                glossy,
+                object,
+                material,
+            );
+        }
+        let info = pbr.base_color_texture.as_ref();
+        let (base, is_missing) = texture(info, Coding::Srgb, "its base colour is grey instead");
         material.base_color_texture = base;
         if is_missing {
             material.base_color *= MISSING_REFLECTANCE;
         }
-        if glossy.is_none() {
-            let info = pbr.metallic_roughness_texture.as_ref();
-            let instead = "it is no metal, and as rough as its factor says";
-            let (rough, is_missing) = texture(info, Coding::Linear, instead);
-            material.metallic_roughness_texture = rough;
-            if is_missing {
-                material.metallic = 0.0;
-            }
+        let info = pbr.metallic_roughness_texture.as_ref();
+        let instead = "it is no metal, and as rough as its factor says";
+        let (rough, is_missing) = texture(info, Coding::Linear, instead);
+        material.metallic_roughness_texture = rough;
+        if is_missing {
+            material.metallic = 0.0;
         }
         if let Some(specular) = extensions.specular.as_ref().filter(|_| material.specular > 0.0) {
             let instead = "it reflects as its factor says";
@@ -220,26 +227,7 @@ impl Materials {
             (material.specular_texture, _) = texture(strength.as_ref(), Coding::Linear, instead);
             (material.specular_color_texture, _) = texture(color.as_ref(), Coding::Srgb, instead);
         }
-        if glossy.is_some() {
-            let text = "KHR_materials_pbrSpecularGlossiness is approximated; its specular texture is not read";
-            output.notes.add(Category::Materials, object, text);
-        }
     }
-}
-
-/// A dielectric of the same diffuse colour, roughness and reflectance.
-fn approximate_glossiness(
-    material: &mut Material,
-    diffuse: [f32; 4],
-    specular: [f32; 3],
-    glossiness: f32,
-) {
-    let [red, green, blue, opacity] = diffuse;
-    material.base_color = Rgb::new(red, green, blue);
-    material.opacity = opacity;
-    material.metallic = 0.0;
-    material.roughness = 1.0 - glossiness;
-    material.specular_color = Rgb::from(specular) / DEFAULT_REFLECTANCE;
 }
 
 /// The texture sets that a material's textures are looked up by.

@@ -14,7 +14,7 @@
 //! | `buffers`, `accessors` | arrays in the buffers |
 //! | `hierarchy` | nodes, parents first, and what stands at them |
 //! | `instancing`, `geometry`, `attributes` | meshes |
-//! | `materials`, `textures` | surfaces |
+//! | `materials`, `glossiness`, `textures` | surfaces |
 //! | `lights`, `fog`, `cameras`, `animation` | what they say |
 //! | `links` | which lights light what |
 
@@ -29,6 +29,7 @@ mod extensions;
 mod fog;
 mod forest;
 mod geometry;
+mod glossiness;
 mod hierarchy;
 mod instancing;
 mod lights;

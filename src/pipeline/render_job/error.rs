@@ -48,6 +48,7 @@ impl RenderError {
         match self {
             RenderError::Names(_) | RenderError::Plan(PlanError::Crop(_)) => true,
             RenderError::View(error) => error.is_usage(),
+            RenderError::Read(error) => error.is_usage(),
             _ => false,
         }
     }

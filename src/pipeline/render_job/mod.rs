@@ -31,7 +31,8 @@ pub use plan::Plan;
 pub use report::{FrameCounts, RenderReport, SceneCounts, Seconds};
 
 use super::{
-    Event, PreviewStamp, Stamp, Strict, TreeChoice, View, Watch, open_learned, with_trees,
+    Event, PreviewStamp, StageOptions, Stamp, Strict, TreeChoice, View, Watch, open_learned,
+    with_trees,
 };
 use crate::render::RenderSettings;
 use crate::render::frame_names::FrameNames;
@@ -48,8 +49,10 @@ use writer::{Writer, Writing};
 /// A shot to be rendered.
 #[derive(Clone, Debug)]
 pub struct RenderJob {
-    /// The scene: `.gltf`, `.glb` or `.obj`.
+    /// The scene: `.gltf`, `.glb` or `.obj`, or a USD stage.
     pub scene: PathBuf,
+    /// What of a USD stage is meant.
+    pub stage: StageOptions,
     /// Its light tree; without one, trees are built in memory.
     pub tree: Option<PathBuf>,
     /// A table of what is hidden from where, if there is one.
@@ -106,13 +109,17 @@ impl RenderJob {
             outputs.check(frames, self.resume)?;
         }
         tell_stage(watch, "reading the scene");
-        let shot = Shot::read(self, watch)?;
-        if watch.is_stopped() {
-            let asked = shot.frames.as_slice().len();
+        let shot = match Shot::read(self, watch) {
+            Err(RenderError::Read(error)) if error.is_stop() => None,
+            shot => Some(shot?),
+        };
+        let asked = shot.as_ref().map(|shot| &shot.frames).or(self.frames.as_ref());
+        let asked = asked.map_or(1, |frames| frames.as_slice().len());
+        let Some(shot) = shot.filter(|_| !watch.is_stopped()) else {
             let frames = FrameCounts { asked, ..FrameCounts::default() };
             let seconds = clock.finish();
             return Ok(RenderReport { frames, seconds, stopped: true, ..RenderReport::default() });
-        }
+        };
         if self.frames.is_none() {
             outputs.check(&shot.frames, self.resume)?;
         }

@@ -19,7 +19,8 @@ pub(super) struct Shot {
 impl Shot {
     pub fn read(job: &RenderJob, watch: &dyn Watch) -> Result<Shot, RenderError> {
         let note = |text: String| watch.tell(Event::Note { text });
-        let mut scene = read_scene(&job.scene, job.strict.as_ref(), &job.force_lights, watch)?;
+        let mut scene =
+            read_scene(&job.scene, &job.stage, job.strict.as_ref(), &job.force_lights, watch)?;
         if let Some(fog) = &job.fog {
             scene.medium = Some(fog.clone());
         }

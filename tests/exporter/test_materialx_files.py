@@ -1,0 +1,220 @@
+"""MaterialX documents that stages refer to."""
+
+import numpy as np
+import pytest
+from conftest import Gltf
+from pxr import Sdf
+from test_materials import QUAD, picture, pixels
+
+STAGE = QUAD.replace("</Mat>", "</Looks/gold>") + 'def "Looks" (references = @looks/a.mtlx@</MaterialX/Materials>) {}\n'
+GOLD = """<?xml version="1.0"?>
+<materialx version="1.38"{attributes}>
+  {before}
+  <standard_surface name="SR" type="surfaceshader">
+    {inputs}
+  </standard_surface>
+  <surfacematerial name="gold" type="material">
+    <input name="surfaceshader" type="surfaceshader" nodename="SR" />
+  </surfacematerial>
+</materialx>
+"""
+COLOR = '<input name="base_color" type="color3" value="0.1, 0.2, 0.3" />'
+
+
+def document(folder, inputs: str = COLOR, before: str = "", attributes: str = "", name: str = "a.mtlx"):
+    (folder / "looks").mkdir(exist_ok=True)
+    path = folder / "looks" / name
+    path.write_text(GOLD.format(inputs=inputs, before=before, attributes=attributes))
+    return path
+
+
+def base(scene: Gltf) -> list[float]:
+    return scene.material("/M")["pbrMetallicRoughness"]["baseColorFactor"][:3]
+
+
+def test_a_reference_composes(export, tmp_path):
+    document(tmp_path)
+    result = export(STAGE)
+    assert result.report["warnings"] == []
+    assert base(Gltf(result.path)) == pytest.approx([0.1, 0.2, 0.3])
+    assert "looks/a.mtlx" in result.report["dependencies"]
+    assert not [name for name in result.report["dependencies"] if "anon" in name]
+
+
+def test_a_document_that_changed_is_read_again(export, tmp_path):
+    path = document(tmp_path)
+    export(STAGE)
+    assert "up to date" in export(STAGE).out
+    path.write_text(path.read_text().replace("0.1, 0.2", "0.7, 0.2"))
+    result = export(STAGE)
+    assert base(Gltf(result.path))[0] == pytest.approx(0.7)
+
+
+@pytest.mark.parametrize("arc", ["payload", "references"])
+def test_payloads_and_default_prims(gltf, tmp_path, arc):
+    document(tmp_path)
+    text = QUAD.replace("</Mat>", "</X/Materials/gold>") + f'def "X" (prepend {arc} = @looks/a.mtlx@) {{}}'
+    assert base(gltf(text)) == pytest.approx([0.1, 0.2, 0.3])
+
+
+def test_a_document_as_a_sublayer(gltf, tmp_path):
+    document(tmp_path)
+    text = "#usda 1.0\n( subLayers = [@looks/a.mtlx@] )\n" + QUAD.replace("</Mat>", "</MaterialX/Materials/gold>")
+    assert base(gltf(text)) == pytest.approx([0.1, 0.2, 0.3])
+
+
+def test_overrides_are_stronger(gltf, tmp_path):
+    document(tmp_path)
+    over = """def "Looks" (references = @looks/a.mtlx@</MaterialX/Materials>) {
+        over "gold" { color3f inputs:base_color = (0.9, 0.8, 0.7) }
+    }"""
+    assert base(gltf(STAGE.split('def "Looks"')[0] + over)) == pytest.approx([0.9, 0.8, 0.7])
+    inner = over.replace(
+        "color3f inputs:base_color = (0.9, 0.8, 0.7)", 'over "SR" { color3f inputs:base_color = (0.5, 0, 0) }'
+    )
+    # The shader reads its material's input: a value of its own is weaker than that connection.
+    assert base(gltf(STAGE.split('def "Looks"')[0] + inner)) == pytest.approx([0.1, 0.2, 0.3])
+
+
+def test_variants_choose_documents(gltf, tmp_path):
+    document(tmp_path)
+    document(tmp_path, COLOR.replace("0.1", "0.6"), name="b.mtlx")
+    text = (
+        QUAD.replace("</Mat>", "</Looks/gold>")
+        + """def "Looks" (variants = { string look = "a" }\n prepend variantSets = "look") {
+        variantSet "look" = {
+            "a" (references = @looks/a.mtlx@</MaterialX/Materials>) { }
+            "b" (references = @looks/b.mtlx@</MaterialX/Materials>) { }
+        }
+    }"""
+    )
+    assert base(gltf(text)) == pytest.approx([0.1, 0.2, 0.3])
+    assert base(gltf(text, "--variant", "/Looks:look=b", out="b.glb")) == pytest.approx([0.6, 0.2, 0.3])
+
+
+def test_documents_under_a_mask_and_in_instances(gltf, tmp_path):
+    document(tmp_path)
+    (tmp_path / "asset.usda").write_text(
+        '#usda 1.0\n(defaultPrim = "A")\ndef Xform "A" {\n'
+        + QUAD.replace("</Mat>", "</A/Looks/gold>").replace("}", "\n}")
+        + 'def "Looks" (references = @looks/a.mtlx@</MaterialX/Materials>) {\n}\n}\n'
+    )
+    text = (
+        'def Xform "W" {'
+        + "".join(f'def "I{i}" (instanceable = true\n references = @asset.usda@) {{}}\n' for i in (1, 2))
+        + "}"
+    )
+    for arguments in ((), ("--mask", "/W/I2")):
+        scene = gltf(text, *arguments, out=f"o{len(arguments)}.glb")
+        assert scene.material("/W/I2/M")["pbrMetallicRoughness"]["baseColorFactor"][0] == pytest.approx(0.1)
+
+
+def test_files_beside_the_document(gltf, tmp_path):
+    inputs = '<input name="base_color" type="color3" nodename="I" />'
+    image = '<image name="I" type="color3"><input name="file" type="filename" value="t.png" colorspace="srgb_texture" /></image>'
+    document(tmp_path, inputs, image, ' fileprefix="maps/"')
+    (tmp_path / "looks" / "maps").mkdir()
+    picture(tmp_path / "looks" / "maps" / "t.png", 200, 100, 50)
+    scene = gltf(STAGE)
+    assert pixels(scene, scene.material("/M")["pbrMetallicRoughness"]["baseColorTexture"])[0, 0, :3].tolist() == [
+        200,
+        100,
+        50,
+    ]
+
+
+def test_color_spaces_of_documents_are_inherited(gltf, tmp_path):
+    document(tmp_path, COLOR, attributes=' colorspace="srgb_texture"')
+    assert base(gltf(STAGE))[0] == pytest.approx(0.01002, abs=1e-4)
+
+
+def test_node_graphs_and_own_definitions(gltf, tmp_path):
+    before = """
+    <nodedef name="ND_tint" node="tint"><input name="c" type="color3" value="1, 1, 1" /><input name="k" type="float" value="0.5" />
+      <output name="out" type="color3" /></nodedef>
+    <nodegraph name="NG_tint" nodedef="ND_tint">
+      <multiply name="m" type="color3">
+        <input name="in1" type="color3" interfacename="c" /><input name="in2" type="float" interfacename="k" />
+      </multiply>
+      <output name="out" type="color3" nodename="m" />
+    </nodegraph>
+    <nodegraph name="NG">
+      <input name="hue" type="color3" value="0.8, 0.4, 0.2" />
+      <tint name="t1" type="color3"><input name="c" type="color3" interfacename="hue" /></tint>
+      <tint name="t2" type="color3"><input name="c" type="color3" nodename="t1" /><input name="k" type="float" value="0.25" /></tint>
+      <output name="result" type="color3" nodename="t2" />
+    </nodegraph>"""
+    document(tmp_path, '<input name="base_color" type="color3" nodegraph="NG" output="result" />', before)
+    assert base(gltf(STAGE)) == pytest.approx(np.array([0.8, 0.4, 0.2]) / 8)
+
+
+def test_documents_include_others(gltf, tmp_path):
+    (tmp_path / "looks").mkdir()
+    (tmp_path / "looks" / "b.mtlx").write_text(GOLD.format(inputs=COLOR, before="", attributes=""))
+    (tmp_path / "looks" / "a.mtlx").write_text(
+        '<?xml version="1.0"?><materialx version="1.38" xmlns:xi="http://www.w3.org/2001/XInclude"><xi:include href="b.mtlx" /></materialx>'
+    )
+    assert base(gltf(STAGE)) == pytest.approx([0.1, 0.2, 0.3])
+
+
+def test_packages(gltf, tmp_path):
+    inputs = '<input name="base_color" type="color3" nodename="I" />'
+    image = '<image name="I" type="color3"><input name="file" type="filename" value="t.png" colorspace="srgb_texture" /></image>'
+    document(tmp_path, inputs, image)
+    picture(tmp_path / "looks" / "t.png", 200, 100, 50)
+    (tmp_path / "scene.usda").write_text("#usda 1.0\n" + STAGE.replace("}", "\n}"))
+    with Sdf.ZipFileWriter.CreateNew(str(tmp_path / "p.usdz")) as package:
+        package.AddFile(str(tmp_path / "scene.usda"), "scene.usda")
+        package.AddFile(str(tmp_path / "looks" / "a.mtlx"), "looks/a.mtlx")
+        package.AddFile(str(tmp_path / "looks" / "t.png"), "looks/t.png")
+    (tmp_path / "looks" / "a.mtlx").unlink()
+    (tmp_path / "looks" / "t.png").unlink()
+    scene = gltf(tmp_path / "p.usdz")
+    assert pixels(scene, scene.material("/M")["pbrMetallicRoughness"]["baseColorTexture"])[0, 0, :3].tolist() == [
+        200,
+        100,
+        50,
+    ]
+
+
+@pytest.mark.parametrize(
+    ("content", "what"),
+    [
+        (None, "missing layer"),
+        ("not xml at all", "unreadable layer"),
+        ('<materialx version="1.38"><standard_surface', "unreadable layer"),
+        (b"\xff\xfe\x00", "unreadable layer"),
+        ("", "unreadable layer"),
+        ("<html></html>", "unreadable layer"),
+    ],
+)
+def test_broken_documents_are_reported(export, tmp_path, content, what):
+    (tmp_path / "looks").mkdir()
+    if content is not None:
+        data = content if isinstance(content, bytes) else content.encode()
+        (tmp_path / "looks" / "a.mtlx").write_bytes(data)
+    result = export(STAGE)
+    assert result.code == 0, result.err
+    assert [line["what"] for line in result.report["warnings"] if line["path"] == "/Looks"] == [what]
+    assert result.warned("materials") == {what, "material binding to nothing"}
+
+
+def test_nodes_that_read_themselves(export, tmp_path):
+    before = '<add name="A" type="color3"><input name="in1" type="color3" nodename="B" /></add>'
+    before += '<add name="B" type="color3"><input name="in1" type="color3" nodename="A" /></add>'
+    document(tmp_path, '<input name="base_color" type="color3" nodename="A" />', before)
+    result = export(STAGE)
+    assert result.code == 0, result.err
+    assert "reads itself" in result.said()
+
+
+def test_definitions_that_read_themselves_end(export, tmp_path):
+    before = """<nodedef name="ND_loop" node="loop"><input name="c" type="color3" value="1, 1, 1" /><output name="out" type="color3" /></nodedef>
+    <nodegraph name="NG_loop" nodedef="ND_loop">
+      <loop name="l" type="color3"><input name="c" type="color3" interfacename="c" /></loop>
+      <output name="out" type="color3" nodename="l" />
+    </nodegraph><loop name="L" type="color3" />"""
+    document(tmp_path, '<input name="base_color" type="color3" nodename="L" />', before)
+    result = export(STAGE)
+    assert result.code == 0, result.err
+    assert "nested too deeply" in result.said()
