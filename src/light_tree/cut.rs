@@ -131,11 +131,11 @@ impl FrameTree<'_> {
             let leg = route.map(|_| 0);
             if how.is_off() {
                 wanted = leg.map(|leg| (scratch.entries.len(), leg));
-                // What is hidden or not linked is known of the root's children, not of the root.
-                let is_linked = V::IS_LINKED && self.links.is_some();
-                let is_known = self.veils.is_some() || is_linked;
-                let known = if is_known { self.weigh(&place) } else { None };
-                let known = known.filter(|weighed| weighed.veils.is_some() || is_linked);
+                // What is hidden, not linked or measured is known of the root's children, not of the root.
+                let is_known = (V::IS_LINKED && self.links.is_some()) || self.fields.is_some();
+                let may_be = self.veils.is_some() || is_known;
+                let known = if may_be { self.weigh(&place) } else { None };
+                let known = known.filter(|weighed| weighed.veils.is_some() || is_known);
                 let weight = known.map_or(weight, |weighed| weighed.importances.iter().sum());
                 scratch.push(Entry::Cluster(place), weight, 1.0);
             } else {

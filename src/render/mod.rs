@@ -35,6 +35,7 @@ pub mod delegate;
 pub mod direct;
 pub mod exr;
 mod exr_header;
+mod far_field;
 pub mod film;
 pub mod fog;
 pub mod frame_names;
