@@ -1,7 +1,9 @@
 //! Lights that tell their intensity by direction: what is picked, and how often that is told.
 
-use crate::support::{AnyViewer, any_viewer, beside, emitters, for_viewer, splitting, tree_over};
-use candelabra::bounds::LightBounds;
+use crate::support::{
+    AnyViewer, any_viewer, beside, emitters, for_viewer, receiver, splitting, tree_over,
+};
+use candelabra::bounds::{Aabb, Cone, LightBounds};
 use candelabra::light_tree::far_field::FarField;
 use candelabra::light_tree::{FrameTree, Moments, Picked, Receiver, Scratch, Splitting, Viewer};
 use glam::Vec3;
@@ -109,6 +111,33 @@ proptest! {
         for_viewer!(viewer, |v| laws_hold(&frame, &plain, v, &beside, &how))?;
     }
 
+    /// The scale of lengths and energies does not matter.
+    #[test]
+    fn scale_does_not_change_probabilities(
+        beams in beams(), viewer in receiver(), size in -20i32..20, energy in -10i32..10
+    ) {
+        let (s, e) = (2f32.powi(size), 2f32.powi(energy));
+        let scale = |b: &LightBounds| LightBounds {
+            aabb: Aabb { min: b.aabb.min * s, max: b.aabb.max * s },
+            energy: b.energy * e,
+            range_m: b.range_m * s,
+            ..*b
+        };
+        let Beams { known, sharpness, turn, .. } = beams;
+        let scaled = Beams { bounds: beams.bounds.iter().map(scale).collect(), known, sharpness, turn };
+        let of = |beams: &Beams, viewer: Receiver| -> Vec<f64> {
+            let tree = tree_over(&beams.bounds);
+            let (frame, _) = tree.at_frame(0).unwrap().with_far_fields(beams, None);
+            (0..beams.bounds.len() as u32).map(|emitter| frame.probability(&viewer, emitter)).collect()
+        };
+        let mut sorted = [of(&beams, viewer), of(&scaled, Receiver { point: viewer.point * s, ..viewer })];
+        // Lights in one place are taken in any order.
+        sorted.iter_mut().for_each(|all| all.sort_by(f64::total_cmp));
+        for (a, b) in sorted[0].iter().zip(&sorted[1]) {
+            prop_assert!((a - b).abs() <= 1e-6 + 1e-4 * a, "{a} {b}");
+        }
+    }
+
     /// Where nothing is known, nothing is another.
     #[test]
     fn without_far_fields_nothing_changes(bounds in emitters(60), viewer in any_viewer()) {
@@ -126,7 +155,6 @@ proptest! {
 /// Two lamps in one place that point apart: who stands in one's beam picks that one.
 #[test]
 fn a_beam_is_found_by_who_stands_in_it() {
-    use candelabra::bounds::{Aabb, Cone};
     let lamp = |axis: Vec3| LightBounds {
         aabb: Aabb { min: Vec3::ZERO, max: Vec3::ZERO },
         cone: Cone { axis, ..Cone::ALL },
