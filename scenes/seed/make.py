@@ -17,6 +17,7 @@ import hidden
 import lamps
 import linked
 import million_points
+import profiles
 import spiral_mesh
 import spiral_points
 import textured_lights
@@ -35,6 +36,8 @@ SCENES = {
     "opening_door": hidden.write_opening_door,
     "behind_house": hidden.write_house,
     "linked": linked.write,
+    "profiles": profiles.write,
+    "profile_hall": profiles.write_hall,
 }
 GLTF = {"million_points", "one_area", "textured_lights"}
 EXPORTER = Path(__file__).resolve().parents[2] / "scripts" / "usd_to_gltf.py"

@@ -15,6 +15,7 @@ A tour, in the order of the work:
 `light_shapes`      tessellation and world-space areas of the intrinsic lights
 `light_carriers`    which glTF object carries which light
 `linking`           which lights light what, and what casts their shadows
+`light_profiles`    the IES profiles of lights
 `light_textures`    the pictures of rect lights and domes
 `pictures`, `baking`, `asset_files`     picture files into arrays, light of any range into a PNG
 `mesh`, `triangulate`, `primvars`, `gprims`     geometry

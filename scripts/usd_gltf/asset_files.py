@@ -31,10 +31,16 @@ class AssetFiles:
         self.dependencies = dependencies
 
     def read(
-        self, owner: object, attribute: Usd.Attribute, code: float, instead: str, report: Notebook
+        self,
+        owner: object,
+        attribute: Usd.Attribute,
+        code: float,
+        instead: str,
+        report: Notebook,
+        what: str = "missing texture",
     ) -> AssetFile | None:
-        """The file that an attribute names; None if it names none, or (reported, with what is done
-        `instead`) if it cannot be read."""
+        """The file that an attribute names; None if it names none, or (reported as `what`, with what is
+        done `instead`) if it cannot be read."""
         asset = attribute.Get(code)
         if not isinstance(asset, Sdf.AssetPath) or not asset.path:
             return None
@@ -46,7 +52,7 @@ class AssetFiles:
             found = f"{asset.path} is a folder" if os.path.isdir(place) else f"{asset.path} cannot be found"
             if os.path.isfile(place):
                 found = f"{asset.path} is there, but cannot be opened"
-            report.warn(owner, "missing texture", f"{found}; {instead}")
+            report.warn(owner, what, f"{found}; {instead}")
             return None
         return _file(resolved, data)
 

@@ -11,6 +11,7 @@ from pxr import Usd, UsdGeom
 from . import EXPORTER
 from .gltf_document import Document, number
 from .light_carriers import LightCarriers
+from .light_profiles import LightProfiles
 from .light_textures import LightTextures
 from .linking import Linking, LinkSubsets
 from .materials import Materials
@@ -60,8 +61,16 @@ def export(source: Path, output: Path, options: Options) -> Exported:
     meshes.link_subsets = LinkSubsets(stage, report.about("lights"))
     tree = PrimTree(stage, meshes, frames, options.purposes, meters_per_unit, report.about("geometry"))
     pictures = LightTextures(document, dependencies, frames, report.about("lights"))
+    profiles = LightProfiles(document, dependencies, frames, report.about("lights"))
     carriers = LightCarriers(
-        document, materials, pictures, frames, meters_per_unit, options.normalize_area, report.about("lights")
+        document,
+        materials,
+        pictures,
+        profiles,
+        frames,
+        meters_per_unit,
+        options.normalize_area,
+        report.about("lights"),
     )
     prims = tree.roots()
     linking = Linking(stage, prims, report.about("lights"))

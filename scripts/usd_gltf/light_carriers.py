@@ -21,6 +21,7 @@ import numpy as np
 
 from .gltf_document import Document, number, numbers
 from .light_inputs import SIZES, Light
+from .light_profiles import WITHOUT_CONE, LightProfiles
 from .light_shapes import Tessellation, tessellate, world_area
 from .light_textures import LightTextures
 from .materials import Emission, Materials
@@ -39,12 +40,14 @@ class LightCarriers:
         document: Document,
         materials: Materials,
         pictures: LightTextures,
+        profiles: LightProfiles,
         frames: Frames,
         meters_per_unit: float,
         normalize_area: str,
         report: Notebook,
     ) -> None:
         self.document, self.materials, self.pictures = document, materials, pictures
+        self.profiles = profiles
         self.frames, self.report = frames, report
         self.square_metres = meters_per_unit**2
         self.normalize_unit = 1.0 if normalize_area == "stage" else self.square_metres
@@ -53,6 +56,9 @@ class LightCarriers:
     def carry(self, light: Light, node: dict, world: np.ndarray, mesh: MeshSource | None) -> None:
         """Make `node`, which stands at `world` (stage units; one matrix or one a frame), this light."""
         extras = dict(light.extras)
+        ies = self.profiles.carry(light)
+        if ies is not None:
+            extras["shaping"] = {**(light.shaping or WITHOUT_CONE), "ies": ies}
         node["extras"]["usdLux"] = extras
         self.report.count(f"lights {light.type}")
         if mesh is not None:
@@ -134,7 +140,7 @@ class LightCarriers:
         """The limit of a normalized light that shrinks to a point."""
         power = _times(light.rgb, np.where(normalize, self.square_metres / self.normalize_unit, 0.0))
         if light.type in ("RectLight", "DiskLight"):
-            shaping = light.shaping or {"coneAngle": 90.0, "coneSoftness": 0.0, "focus": 0.0, "focusTint": [0.0] * 3}
+            shaping = extras.get("shaping") or WITHOUT_CONE
             if light.shaping and any(light.shaping["focusTint"]):
                 why = "the cosine of a flat light and the tint cannot both be carried; the tint is lost"
                 self.report.warn(light.path, "focusTint of a light without size", why)
@@ -211,9 +217,8 @@ class LightCarriers:
             self.report.warn(light.path, "animated inputs:angle", why)
         self._animated(extras, lux)
         self._khr_light(node, "directional", _first(lux))
-        if light.shaping is not None:
+        if extras.pop("shaping", None) is not None:
             self.report.warn(light.path, "shaping of a DistantLight", "it has no position to be shaped from")
-            extras.pop("shaping", None)
 
     def _dome(self, light: Light, extras: dict) -> None:
         rgb = light.rgb

@@ -46,6 +46,15 @@ _THINNEST = 1e-6
 _BRIGHTNESS = ("intensity", "exposure", "color", "enableColorTemperature", "colorTemperature", "diffuse")
 
 
+@dataclass(frozen=True)
+class IesProfile:
+    """A photometric profile, by the file that it is in."""
+
+    file: Usd.Attribute
+    angle_scale: float
+    normalize: bool
+
+
 @dataclass
 class Light:
     """A light prim, read: everything but where it stands."""
@@ -61,6 +70,7 @@ class Light:
     stretch: np.ndarray | None = None
     """(frames, 4, 4): what `size` is scaled by, if it is animated."""
     shaping: dict | None = None
+    profile: IesProfile | None = None
     angle_deg: np.ndarray = field(default_factory=lambda: np.zeros(()))
     """Full angle of a DistantLight: (), or (frames,)."""
     is_point: bool = False
@@ -112,6 +122,7 @@ def read_light(prim: Usd.Prim, kind: str, frames: Frames, report: Notebook) -> L
         rgb=_emission(inputs),
         normalize=_track([bool(inputs.at("normalize", code)) for code in _codes(inputs, "normalize")]),
         shaping=_shaping(inputs, kind),
+        profile=_profile(inputs),
         # The schema names these without `inputs:`.
         is_point=kind == "SphereLight" and _flag(prim, "treatAsPoint", frames),
         is_line=kind == "CylinderLight" and _flag(prim, "treatAsLine", frames),
@@ -219,6 +230,19 @@ def _shaping(inputs: LightAttributes, kind: str) -> dict | None:
         "focus": focus,
         "focusTint": [max(c, 0.0) for c in tint],
     }
+
+
+def _profile(inputs: LightAttributes) -> IesProfile | None:
+    """The photometric profile of the first frame, if there is one."""
+    file = inputs.asset("shaping:ies:file")
+    if file is None:
+        return None
+    inputs.still("shaping:ies:file")
+    scale, normalize = inputs.still("shaping:ies:angleScale"), bool(inputs.still("shaping:ies:normalize"))
+    if not is_finite(scale):
+        inputs.report.warn(inputs.path, "shaping:ies:angleScale is not finite", "0 is used, which scales nothing")
+        scale = 0.0
+    return IesProfile(file, scale, normalize)
 
 
 def _verbatim(inputs: LightAttributes) -> dict:

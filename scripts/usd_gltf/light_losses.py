@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pxr import Sdf
-
 from .light_attributes import LightAttributes
 
 
@@ -11,7 +9,6 @@ def report_losses(inputs: LightAttributes) -> None:
     """Report everything about a light that the file holds only as extras, or not at all."""
     _multipliers(inputs)
     _shadows(inputs)
-    _profile(inputs)
     _relations(inputs)
 
 
@@ -36,18 +33,6 @@ def _shadows(inputs: LightAttributes) -> None:
         inputs.report.warn(inputs.path, "shadow:distance", why)
     if inputs.still("shadow:falloff") >= 0:
         inputs.report.warn(inputs.path, "shadow:falloff", why)
-
-
-def _profile(inputs: LightAttributes) -> None:
-    ies = inputs.asset("shaping:ies:file")
-    if ies is None:
-        return
-    asset = ies.Get(inputs.frames.first)
-    name = asset.path if isinstance(asset, Sdf.AssetPath) else "it"
-    why = f"{name} is kept in extras only; the light is exported without it"
-    if not inputs.first("shaping:ies:normalize"):
-        why += " and without the profile's own brightness, which UsdLux multiplies by"
-    inputs.report.warn(inputs.path, "IES profile", why)
 
 
 def _relations(inputs: LightAttributes) -> None:

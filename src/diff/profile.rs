@@ -2,7 +2,7 @@
 
 use super::light::Profile;
 use crate::emitter::{Emitters, LightSource, MeshLight};
-use crate::scene::{LightKind, Pixels, Scene, Shaping, Texture};
+use crate::scene::{IesProfile, LightKind, Pixels, Scene, Shaping, Texture};
 use rayon::prelude::*;
 
 /// Hashes of what the instances of a mesh light share. Each is computed once, however many instances
@@ -36,7 +36,7 @@ impl Profiles {
                 _ => (None, 0),
             },
         };
-        let half_angle_rad = shaping.map(|shaping| shaping.half_angle_rad());
+        let half_angle_rad = shaping.map(|shaping| shaping.lit(scene).half_angle_rad as f32);
         let mut hasher = blake3::Hasher::new();
         hasher.update(&texture.to_le_bytes());
         match shaping {
@@ -49,6 +49,10 @@ impl Profiles {
                 for number in [softness, focus, r, g, b] {
                     hasher.update(&number.to_le_bytes());
                 }
+                let ies = shaping.and_then(|shaping| shaping.ies(scene));
+                ies.into_iter().flat_map(IesProfile::numbers).for_each(|number| {
+                    hasher.update(&number.to_le_bytes());
+                });
             }
         }
         Profile { pattern: short(&hasher), half_angle_rad }

@@ -2,6 +2,7 @@
 
 use super::posed::PosedEmitters;
 use super::set::EmitterPlace;
+use crate::math::directions::{aim, light_axes};
 use crate::scene::LightKind;
 use glam::{DVec3, Vec3};
 use std::f64::consts::FRAC_PI_2;
@@ -47,12 +48,15 @@ impl PosedEmitters<'_> {
             EmitterPlace::Light(row) => {
                 let light = &self.scene.lights[row as usize];
                 let LightKind::Spot { shaping, .. } = &light.kind else { return None };
+                let lit = shaping.lit(self.scene);
                 // A hair wider, for what rounding loses.
-                let half_angle_rad = f64::from(shaping.half_angle_rad()) * (1.0 + 1e-5);
-                let apex = Vec3::from(self.pose.world(light.node).translation).as_dvec3();
+                let half_angle_rad = lit.half_angle_rad * (1.0 + 1e-5);
+                let world = self.pose.world(light.node);
+                let apex = Vec3::from(world.translation).as_dvec3();
+                let is_aimed = lit.axis == DVec3::NEG_Z;
                 (half_angle_rad < FRAC_PI_2).then(|| Beam {
                     apex,
-                    axis: self.aim(light.node),
+                    axis: if is_aimed { aim(&world) } else { light_axes(&world) * lit.axis },
                     half_angle_rad,
                 })
             }

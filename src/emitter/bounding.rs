@@ -1,21 +1,23 @@
 //! The bounds of emitters. The tree is built over them.
 //!
 //! Energy is the luminance of the peak radiant intensity: `I` of a point, `L A` of a triangle,
-//! `L pi r^2` of a sphere. It is never quite zero: an emitter that a transform has flattened, or that
+//! `L pi r^2` of a sphere. With a photometric profile it is the mean over directions that counts and not the peak, which
+//! may be anywhere. It is never quite zero: an emitter that a transform has flattened, or that
 //! is dark in this frame, keeps its place in the tree.
 
 use super::mesh_light::MeshLight;
 use super::posed::PosedEmitters;
-use super::set::{EmitterRef, LightSource};
+use super::set::{EmitterPlace, EmitterRef, LightSource};
 use super::triangle::WorldTriangle;
 use crate::bounds::{Aabb, Cone, LightBounds};
 use crate::math::Similarity;
 use crate::math::color::{Rgb, luminance};
-use crate::math::directions::{aim, mirrors};
-use crate::scene::{LightKind, Shaping};
+use crate::math::directions::{aim, light_axes, mirrors};
+use crate::scene::{IesProfile, LightKind, LitCone, Shaping};
 use glam::{Affine3A, DVec3, Vec3};
 use rayon::prelude::*;
 use std::f32::consts::PI;
+use std::f64::consts::FRAC_PI_2;
 use std::ops::Range;
 
 /// A light whose numbers are too large for `f32`.
@@ -97,8 +99,8 @@ impl PosedEmitters<'_> {
         let handedness = if mirrors(world) { -1.0 } else { 1.0 };
         let double_sided = self.scene.material_of(mesh_light.mesh).is_some_and(|m| m.double_sided);
         let cone = match mesh_light.shaping {
-            Some(shaping) if shaping.half_angle_rad() < PI / 2.0 => {
-                Cone::spot(aim(world).as_vec3(), shaping.half_angle_rad())
+            Some(shaping) if shaping.lit(self.scene).half_angle_rad < FRAC_PI_2 => {
+                self.lit_cone(&shaping, world)
             }
             _ => {
                 let normal = triangle.area_normal().normalize_or(DVec3::Z) * handedness;
@@ -108,7 +110,9 @@ impl PosedEmitters<'_> {
         LightBounds {
             aabb: Aabb::around(triangle.corners),
             cone,
-            energy: luminance(nits * mesh_light.texture_mean(own)) * triangle.area(),
+            energy: luminance(nits * mesh_light.texture_mean(own))
+                * triangle.area()
+                * self.mean(mesh_light.shaping),
             range_m: f32::INFINITY,
         }
     }
@@ -117,14 +121,17 @@ impl PosedEmitters<'_> {
         let light = &self.scene.lights[row as usize];
         let strength = luminance(self.scene.rgb_of_light(row, self.pose));
         let here = Vec3::from(self.pose.world(light.node).translation);
-        let aim = self.aim(light.node).as_vec3();
-        let aimed = |shaping: &Shaping| Cone::spot(aim, shaping.half_angle_rad());
+        let world = self.pose.world(light.node);
+        let aimed = |shaping: &Shaping| self.lit_cone(shaping, &world);
         let (radius, cone, energy) = match &light.kind {
             LightKind::Point { .. } => (0.0, Cone::ALL, strength),
-            LightKind::Spot { shaping, .. } => (0.0, aimed(shaping), strength),
+            LightKind::Spot { shaping, .. } => {
+                (0.0, aimed(shaping), strength * self.mean(Some(*shaping)))
+            }
             LightKind::Sphere { shaping, .. } => {
                 let radius = self.sphere(light).radius;
                 let cone = shaping.as_ref().map_or(Cone::ALL, aimed);
+                let strength = strength * self.mean(*shaping);
                 (radius, cone, strength * PI * radius * radius)
             }
             LightKind::Distant { .. } | LightKind::Dome { .. } => {
@@ -135,16 +142,77 @@ impl PosedEmitters<'_> {
         LightBounds { aabb, cone, energy, range_m: light.range_m.unwrap_or(f32::INFINITY) }
     }
 
+    /// A cone around the directions in which shaped light leaves.
+    fn lit_cone(&self, shaping: &Shaping, world: &Affine3A) -> Cone {
+        let LitCone { axis, half_angle_rad } = shaping.lit(self.scene);
+        let axis = if axis == DVec3::NEG_Z { aim(world) } else { light_axes(world) * axis };
+        Cone::spot(axis.as_vec3(), half_angle_rad as f32)
+    }
+
+    /// The mean of a photometric profile; 1 without one.
+    fn mean(&self, shaping: Option<Shaping>) -> f32 {
+        shaping.and_then(|shaping| shaping.ies(self.scene)).map_or(1.0, IesProfile::mean)
+    }
+
+    /// Whether an emitter's light has a photometric profile.
+    pub fn is_photometric(&self, emitter: u32) -> bool {
+        let shaping = match self.emitters.place_of(emitter) {
+            EmitterPlace::Triangle { instance, .. } => {
+                self.scene.instances[instance as usize].shaping
+            }
+            EmitterPlace::Light(row) => self.scene.lights[row as usize].kind.shaping(),
+        };
+        shaping.is_some_and(|shaping| shaping.ies(self.scene).is_some())
+    }
+
+    /// The luminance of the intensity that leaves an emitter in a direction, seen from far away, in the unit of
+    /// energies. The direction is unit, in world space.
+    pub fn intensity(&self, emitter: u32, direction: Vec3) -> f32 {
+        let direction = direction.as_dvec3();
+        match self.emitters.place_of(emitter) {
+            EmitterPlace::Triangle { instance: row, triangle } => {
+                let instance = &self.scene.instances[row as usize];
+                let across =
+                    self.triangle(instance, triangle).area_normal() * self.handedness(instance);
+                let seen = across.dot(direction);
+                let seen =
+                    if self.material(instance).double_sided { seen.abs() } else { seen.max(0.0) };
+                if seen == 0.0 {
+                    return 0.0;
+                }
+                let EmitterRef { light, own } = self.emitters.get(emitter);
+                let mean = match self.emitters.lights()[light as usize].source {
+                    LightSource::Mesh { mesh_light, .. } => {
+                        self.emitters.mesh_lights()[mesh_light as usize].texture_mean(own)
+                    }
+                    LightSource::Light(_) => Rgb::ONE,
+                };
+                let nits = self.scene.rgb_of_instance(row, self.pose) * mean;
+                let profile = self.profile(instance.shaping, instance.node, -direction);
+                luminance(nits * profile) * (0.5 * seen) as f32
+            }
+            EmitterPlace::Light(row) => {
+                let light = &self.scene.lights[row as usize];
+                let profile = self.profile(light.kind.shaping(), light.node, -direction);
+                let strength = luminance(self.scene.rgb_of_light(row, self.pose) * profile);
+                match light.kind {
+                    LightKind::Sphere { .. } => strength * PI * self.sphere(light).radius.powi(2),
+                    _ => strength,
+                }
+            }
+        }
+    }
+
     /// The middle of an emitter, world space. Points in fog are drawn by the angle under which it sees
     /// them.
     pub fn middle(&self, emitter: u32) -> Vec3 {
         match self.emitters.place_of(emitter) {
-            super::EmitterPlace::Triangle { instance, triangle } => {
+            EmitterPlace::Triangle { instance, triangle } => {
                 let instance = &self.scene.instances[instance as usize];
                 let [a, b, c] = self.triangle(instance, triangle).corners;
                 a + ((b - a) + (c - a)) / 3.0
             }
-            super::EmitterPlace::Light(row) => {
+            EmitterPlace::Light(row) => {
                 Vec3::from(self.pose.world(self.scene.lights[row as usize].node).translation)
             }
         }

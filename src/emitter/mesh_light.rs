@@ -96,17 +96,17 @@ pub(super) fn find(scene: &Scene, known: &KnownMeans) -> MeshLights {
 struct Key {
     mesh: u32,
     peak: [u32; 3],
-    shaping: Option<(u8, [u32; 6])>,
+    shaping: Option<(u8, [u32; 6], Option<u32>)>,
 }
 
 impl Key {
     fn new(instance: &Instance, peak: Rgb) -> Key {
         let shaping = instance.shaping.map(|shaping| match shaping {
             Shaping::Khr { inner_rad, outer_rad } => {
-                (0, [inner_rad, outer_rad, 0.0, 0.0, 0.0, 0.0].map(f32::to_bits))
+                (0, [inner_rad, outer_rad, 0.0, 0.0, 0.0, 0.0].map(f32::to_bits), None)
             }
-            Shaping::Usd { cone_rad, softness, focus, focus_tint: [r, g, b] } => {
-                (1, [cone_rad, softness, focus, r, g, b].map(f32::to_bits))
+            Shaping::Usd { cone_rad, softness, focus, focus_tint: [r, g, b], profile } => {
+                (1, [cone_rad, softness, focus, r, g, b].map(f32::to_bits), profile)
             }
         });
         Key { mesh: instance.mesh, peak: peak.to_array().map(f32::to_bits), shaping }

@@ -6,7 +6,7 @@ use super::triangle::WorldTriangle;
 use crate::math::angle::OffAxis;
 use crate::math::built_in;
 use crate::math::color::Rgb;
-use crate::math::directions::{aim, mirrors};
+use crate::math::directions::{aim, light_axes, mirrors};
 use crate::scene::{Instance, Light, LightKind, Material, Pose, Scene, Shaping};
 use glam::{DVec3, Vec2, Vec3};
 
@@ -150,8 +150,17 @@ impl<'a> PosedEmitters<'a> {
 
     /// The factor of an emission profile about a node's -Z on light that a viewer sees in some
     /// direction, of any length but zero.
-    fn profile(&self, shaping: Option<Shaping>, node: u32, direction: DVec3) -> Rgb {
-        shaping.map_or(Rgb::ONE, |s| s.factor(OffAxis::between(self.aim(node), -direction)))
+    pub(super) fn profile(&self, shaping: Option<Shaping>, node: u32, direction: DVec3) -> Rgb {
+        let Some(shaping) = shaping else { return Rgb::ONE };
+        let factor = shaping.factor(OffAxis::between(self.aim(node), -direction));
+        match shaping.ies(self.scene) {
+            None => factor,
+            Some(profile) if factor != Rgb::ZERO => {
+                let axes = light_axes(&self.pose.world(node));
+                factor * profile.factor(axes.transpose() * -direction.normalize())
+            }
+            Some(_) => factor,
+        }
     }
 
     /// Radiance that a ray sees where it has hit an emitter, nits. `direction` is the ray's, unit.

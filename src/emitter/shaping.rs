@@ -5,11 +5,12 @@
 
 use crate::math::angle::OffAxis;
 use crate::math::color::Rgb;
-use crate::scene::Shaping;
+use crate::scene::{IesProfile, LitCone, Scene, Shaping};
+use glam::DVec3;
 use std::f32::consts::PI;
 
 impl Shaping {
-    /// The factor on emission in a direction.
+    /// The factor on emission in a direction, but for a [photometric profile](Self::ies).
     ///
     /// `KHR_lights_punctual` ("Inner and Outer Cone Angles") and UsdLux's ShapingAPI (schema of
     /// usd-core 26.11: `focus`, `focusTint`, `cone:angle`, `cone:softness`).
@@ -27,7 +28,7 @@ impl Shaping {
                 };
                 Rgb::splat((ramp * ramp) as f32)
             }
-            Shaping::Usd { cone_rad, softness, focus, focus_tint } => {
+            Shaping::Usd { cone_rad, softness, focus, focus_tint, .. } => {
                 let (cone, softness) = (f64::from(cone_rad), f64::from(softness));
                 if theta > cone {
                     return Rgb::ZERO;
@@ -45,7 +46,22 @@ impl Shaping {
         }
     }
 
-    /// The half angle beyond which it is dark, radians.
+    /// Its photometric profile, if it has one.
+    pub fn ies<'a>(&self, scene: &'a Scene) -> Option<&'a IesProfile> {
+        match *self {
+            Shaping::Usd { profile: Some(profile), .. } => Some(&scene.profiles[profile as usize]),
+            _ => None,
+        }
+    }
+
+    /// A cone outside which it is dark, in the light's own space: its own, or that of its photometric profile.
+    pub fn lit(&self, scene: &Scene) -> LitCone {
+        let own = LitCone { axis: DVec3::NEG_Z, half_angle_rad: self.half_angle_rad().into() };
+        let ies = self.ies(scene).map(IesProfile::lit);
+        ies.filter(|ies| ies.half_angle_rad < own.half_angle_rad).unwrap_or(own)
+    }
+
+    /// The half angle beyond which it is dark whatever its photometric profile, radians.
     pub fn half_angle_rad(&self) -> f32 {
         match *self {
             Shaping::Khr { outer_rad, .. } => outer_rad,
@@ -62,7 +78,7 @@ fn cosine_difference(a: f64, b: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use glam::{DQuat, DVec3};
+    use glam::DQuat;
     use proptest::prelude::*;
     use std::f64::consts::FRAC_PI_2;
 
@@ -73,7 +89,13 @@ mod tests {
     #[test]
     fn profiles_are_full_on_the_axis_and_dark_outside() {
         let khr = Shaping::Khr { inner_rad: 0.3, outer_rad: 0.6 };
-        let usd = Shaping::Usd { cone_rad: 0.6, softness: 0.5, focus: 2.0, focus_tint: [0.0; 3] };
+        let usd = Shaping::Usd {
+            cone_rad: 0.6,
+            softness: 0.5,
+            focus: 2.0,
+            focus_tint: [0.0; 3],
+            profile: None,
+        };
         for shaping in [khr, usd] {
             assert!((shaping.factor(off(0.0)) - Rgb::ONE).length() < 1e-6);
             assert_eq!(shaping.factor(off(0.61)), Rgb::ZERO);
@@ -114,7 +136,7 @@ mod tests {
             let khr = Shaping::Khr { inner_rad, outer_rad }.factor(off).x;
             prop_assert!((f64::from(khr) - square(ramp)).abs() < 1e-5, "{khr} {}", square(ramp));
             let softness = ((outer - inner) / outer) as f32;
-            let usd = Shaping::Usd { cone_rad: outer_rad, softness, focus: 0.0, focus_tint: [0.0; 3] };
+            let usd = Shaping::Usd { cone_rad: outer_rad, softness, focus: 0.0, focus_tint: [0.0; 3], profile: None };
             let smooth = 1.0 - share * share * (3.0 - 2.0 * share);
             let usd = usd.factor(off).x;
             prop_assert!((f64::from(usd) - smooth).abs() < 1e-5, "{usd} {smooth}");
@@ -126,7 +148,7 @@ mod tests {
             let theta = 10f64.powf(decade);
             let ln_cosine = if theta < 1e-3 { -0.5 * theta * theta } else { theta.cos().ln() };
             let focus = (f64::ln(left) / ln_cosine) as f32;
-            let usd = Shaping::Usd { cone_rad: PI, softness: 0.0, focus, focus_tint: [0.0; 3] };
+            let usd = Shaping::Usd { cone_rad: PI, softness: 0.0, focus, focus_tint: [0.0; 3], profile: None };
             let value = usd.factor(off(theta)).x;
             prop_assert!((f64::from(value) - left).abs() < 1e-5, "{value} {left}");
         }
@@ -135,8 +157,13 @@ mod tests {
     #[test]
     fn a_hard_cone_has_no_penumbra() {
         for angle in [1e-7f32, 1e-4, 0.5, FRAC_PI_2 as f32] {
-            let usd =
-                Shaping::Usd { cone_rad: angle, softness: 0.0, focus: 0.0, focus_tint: [0.0; 3] };
+            let usd = Shaping::Usd {
+                cone_rad: angle,
+                softness: 0.0,
+                focus: 0.0,
+                focus_tint: [0.0; 3],
+                profile: None,
+            };
             // Equal angles are what is left of some files' after rounding.
             let khr = Shaping::Khr { inner_rad: angle, outer_rad: angle };
             for hard in [usd, khr] {
@@ -145,7 +172,13 @@ mod tests {
                 assert_eq!(hard.factor(off(f64::from(angle) * (1.0 + 1e-6))), Rgb::ZERO);
             }
         }
-        let none = Shaping::Usd { cone_rad: 0.0, softness: 0.5, focus: 0.0, focus_tint: [0.0; 3] };
+        let none = Shaping::Usd {
+            cone_rad: 0.0,
+            softness: 0.5,
+            focus: 0.0,
+            focus_tint: [0.0; 3],
+            profile: None,
+        };
         assert_eq!(none.factor(off(1e-9)), Rgb::ZERO);
         assert!(none.factor(off(0.0)).is_finite());
     }
@@ -153,7 +186,13 @@ mod tests {
     #[test]
     fn the_focus_tint_colours_what_focus_dims() {
         let tint = [1.0, 0.0, 0.0];
-        let red = |focus| Shaping::Usd { cone_rad: PI, softness: 0.0, focus, focus_tint: tint };
+        let red = |focus| Shaping::Usd {
+            cone_rad: PI,
+            softness: 0.0,
+            focus,
+            focus_tint: tint,
+            profile: None,
+        };
         let off_axis = red(1.0).factor(off(0.25f64.acos()));
         assert!((off_axis - Rgb::new(1.0, 0.25, 0.25)).length() < 1e-6);
         assert_eq!(red(1e9).factor(off(FRAC_PI_2)), Rgb::X);

@@ -21,6 +21,7 @@ mod census;
 mod error;
 mod extent;
 mod gltf;
+mod ies;
 mod image;
 mod normals;
 mod notes;

@@ -112,6 +112,8 @@ fn lights(needs: &Requirements, emitters: &Emitters) -> Vec<Feature> {
         Feature::new("suns", needs.suns).with("weighed beside the tree at every point"),
         Feature::new("domes", needs.domes).with("weighed beside the tree at every point"),
         Feature::new("emission profiles", needs.shaped_lights),
+        Feature::new("photometric profiles", needs.photometric_lights)
+            .with("the tree weighs these lights by their intensity towards each point"),
         Feature::new("lights with a range", needs.ranges)
             .with("weighed in groups of the tree that hold one"),
         Feature::new("forced lights", needs.forced)

@@ -225,11 +225,11 @@ impl FrameTree<'_> {
 
     /// The importance of everything in the tree, to compare with that of lights beside it.
     fn weight_of_root<V: Viewer>(&self, place: &Place<V>) -> f64 {
-        // What is hidden or not linked is known of the root's children, not of the root.
-        let is_linked = V::IS_LINKED && self.links.is_some();
-        let is_known = self.veils.is_some() || is_linked;
-        let known = if is_known { self.weigh(place) } else { None };
-        let known = known.filter(|weighed| weighed.veils.is_some() || is_linked);
+        // What is hidden, not linked or measured is known of the root's children, not of the root.
+        let is_known = (V::IS_LINKED && self.links.is_some()) || self.fields.is_some();
+        let may_be = self.veils.is_some() || is_known;
+        let known = if may_be { self.weigh(place) } else { None };
+        let known = known.filter(|weighed| weighed.veils.is_some() || is_known);
         known.map_or_else(
             || self.total_importance(&place.viewer),
             |weighed| weighed.importances.iter().sum(),

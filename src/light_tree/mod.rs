@@ -30,11 +30,13 @@
 //! | `learned` | where receivers are, and what they see |
 //! | `veil` | what is known of how much of each cluster is hidden |
 //! | `linking` | which lights light which receivers |
+//! | `far_field` | what lights send in each direction, where that was measured |
 
 mod base;
 mod builder;
 mod cut;
 mod digest;
+pub mod far_field;
 mod front;
 mod glossy;
 mod group;

@@ -72,6 +72,11 @@ impl FrameTree<'_> {
     pub(super) fn weigh<V: Viewer>(&self, place: &Place<V>) -> Option<Weighed<'_>> {
         let group = self.groups.get(place.at as usize)?;
         let (mut importances, spreads) = group.weigh(&place.viewer);
+        if V::IS_ORIENTED
+            && let Some(fields) = &self.fields
+        {
+            fields.weigh(self, place, &mut importances);
+        }
         if built_in::INSTANCES {
             importances.iter_mut().for_each(|importance| *importance *= place.unit);
         }

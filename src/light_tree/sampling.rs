@@ -6,6 +6,7 @@
 //! pick was. Depth has no limit.
 
 use super::cut::Picked;
+use super::far_field::FrameFields;
 use super::group::Group;
 use super::leaves::{LeafTable, Leaves, Placed};
 use super::linking::FrameLinks;
@@ -54,6 +55,8 @@ pub struct FrameTree<'a> {
     pub(super) veils: Option<Veils<'a>>,
     /// Which lights light which receivers.
     pub(super) links: Option<Arc<FrameLinks>>,
+    /// Which lights tell their intensity by direction.
+    pub(super) fields: Option<FrameFields<'a>>,
     /// The first emitter of a forced light, if there is one.
     unforced_count: u32,
 }
@@ -86,6 +89,7 @@ impl<D: AsRef<[u8]>> LightTree<D> {
             emitter_count: self.emitter_count() as u32,
             veils: None,
             links: None,
+            fields: None,
             unforced_count: self.first_of_class(LightRow::FORCED),
         })
     }

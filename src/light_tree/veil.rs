@@ -112,6 +112,8 @@ pub struct Veiled<V> {
 }
 
 impl<V: Viewer> Viewer for Veiled<V> {
+    const IS_ORIENTED: bool = V::IS_ORIENTED;
+
     #[inline(always)]
     fn cell(&self) -> Cell {
         self.cell

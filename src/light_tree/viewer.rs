@@ -43,6 +43,9 @@ pub trait Viewer: Copy {
         Cell::NONE
     }
 
+    /// Whether it heeds where lights send their light. If not, [far fields](super::far_field) are not asked.
+    const IS_ORIENTED: bool = true;
+
     /// Whether only some lights may light it. If not, nothing is spent on links.
     const IS_LINKED: bool = false;
 
@@ -85,6 +88,8 @@ impl Viewer for Receiver {
 }
 
 impl<V: Viewer> Viewer for DistanceOnly<V> {
+    const IS_ORIENTED: bool = false;
+
     #[inline(always)]
     fn factors(&self, cluster: &Cluster) -> Factors {
         self.0.factors(&Cluster { sin_half_theta_o: 1.0, ..*cluster })

@@ -11,6 +11,21 @@ pub fn aim(transform: &Affine3A) -> DVec3 {
     (-transform.matrix3.as_dmat3().z_axis).try_normalize().unwrap_or(DVec3::NEG_Z)
 }
 
+/// The axes of a light that a transform places, orthonormal, world space: X, Y and Z as columns. Z is opposite to
+/// where it [aims](aim), X is as near to the image of X as that allows. Sizes, even uneven ones, do not turn them; a
+/// mirror turns Y around.
+pub fn light_axes(transform: &Affine3A) -> DMat3 {
+    let matrix = transform.matrix3.as_dmat3();
+    let z = -aim(transform);
+    let across = |axis: DVec3| {
+        axis.try_normalize().and_then(|axis| axis.reject_from_normalized(z).try_normalize())
+    };
+    let x = across(matrix.x_axis).or_else(|| across(matrix.y_axis.cross(z)));
+    let x = x.unwrap_or_else(|| z.any_orthonormal_vector());
+    let y = z.cross(x) * if mirrors(transform) { -1.0 } else { 1.0 };
+    DMat3::from_cols(x, y, z)
+}
+
 /// Whether a transform turns a left hand into a right one. A flat transform does not.
 pub fn mirrors(transform: &Affine3A) -> bool {
     transform.matrix3.as_dmat3().determinant() < 0.0

@@ -3,6 +3,7 @@
 use super::buffers::RenderBuffers;
 use super::camera::CameraRays;
 use super::direct::FoundByReflection;
+use super::far_field::StillTables;
 use super::film::{Film, Shown, half_of};
 use super::fog::Fog;
 use super::layers::Aov;
@@ -33,6 +34,7 @@ pub struct RenderDelegate<'a> {
     geometry: RayScene,
     skies: Skies,
     links: Option<ShotLinks<'a>>,
+    far_fields: StillTables,
     settings: RenderSettings,
     plan: Result<Plan, PlanError>,
     camera: Camera,
@@ -89,6 +91,7 @@ impl<'a> RenderDelegate<'a> {
             geometry: RayScene::new(scene, &scene.pose_at(0.0)),
             skies: Skies::default(),
             links: ShotLinks::new(scene, emitters),
+            far_fields: StillTables::default(),
             plan: Plan::new(scene, emitters, &settings),
             settings,
             camera,
@@ -143,9 +146,15 @@ impl<'a> RenderDelegate<'a> {
         let infinite = self.skies.lights(self.scene, &pose);
         assert_eq!(tree.emitter_count(), self.emitters.len(), "the tree belongs to another scene");
         let learned = learned.filter(|learned| learned.tree == tree.still_key());
+        let emitters = PosedEmitters { scene: self.scene, emitters: self.emitters, pose: &pose };
+        let file = tree;
         let tree = match &self.links {
             Some(links) => tree.at_frame_linked(frame, links.lit_by())?,
             None => tree.at_frame(frame)?,
+        };
+        let tree = match self.scene.profiles.is_empty() {
+            true => tree,
+            false => self.far_fields.told(file, tree, &emitters),
         };
         let tree = match learned {
             Some(learned) => tree.veiled(learned.veils),
@@ -157,7 +166,7 @@ impl<'a> RenderDelegate<'a> {
             settings: &self.settings,
             tracer: self.geometry.for_pose(self.scene, &pose),
             surfaces: Surfaces::new(self.scene, &pose),
-            emitters: PosedEmitters { scene: self.scene, emitters: self.emitters, pose: &pose },
+            emitters,
             infinite: &infinite,
             picker: LightPicker::new(&self.settings, tree, &infinite).linked(links),
             links,

@@ -10,6 +10,7 @@
 //! | [`path`], `walk` | how does light get from a lamp to the eye, and where are its vertices? |
 //! | [`direct`], [`fog`] | what do picked lights give a surface, what a stretch of fog? |
 //! | [`links`] | which lights light a surface, and what casts their shadows? |
+//! | `far_field` | what do lights with a photometric profile tell the tree? |
 //! | [`picker`] | which lights are sampled there, and how often is each expected to be? |
 //! | [`knob`] | how readily are clusters split, if nobody says? |
 //! | [`camera`] | which ray belongs to a point of the picture? |
@@ -35,6 +36,7 @@ pub mod delegate;
 pub mod direct;
 pub mod exr;
 mod exr_header;
+mod far_field;
 pub mod film;
 pub mod fog;
 pub mod frame_names;

@@ -72,6 +72,15 @@ impl LightKind {
         matches!(self, LightKind::Distant { .. } | LightKind::Dome { .. })
     }
 
+    /// Its emission profile, if it has one.
+    pub fn shaping(&self) -> Option<Shaping> {
+        match *self {
+            LightKind::Spot { shaping, .. } => Some(shaping),
+            LightKind::Sphere { shaping, .. } => shaping,
+            _ => None,
+        }
+    }
+
     /// Its strength, in its own unit: candela of a point or a spot, nits of a sphere or a dome, lux
     /// of a sun.
     pub fn rgb(&self) -> Rgb {
@@ -87,7 +96,7 @@ impl LightKind {
     }
 }
 
-/// An emission profile: a factor on radiance or intensity by the angle off the axis (-Z).
+/// An emission profile: a factor on radiance or intensity by the angle off the axis (-Z), or by the direction.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Shaping {
     /// `KHR_lights_punctual`: squared linear-in-cosine ramp between the two half angles.
@@ -107,5 +116,8 @@ pub enum Shaping {
         focus: f32,
         /// The colour that off-axis light is tinted towards where focus dims it; black by default.
         focus_tint: [f32; 3],
+        /// The photometric profile that multiplies all this: an index into
+        /// [`Scene::profiles`](super::Scene::profiles).
+        profile: Option<u32>,
     },
 }

@@ -12,6 +12,7 @@
 //! | [`materials`](Scene::materials), [`textures`](Scene::textures) | how a surface reflects and emits |
 //! | [`instances`](Scene::instances) | a mesh put at a node: what a ray can hit |
 //! | [`lights`](Scene::lights) | lights that are not meshes: points, spots, spheres, suns, domes |
+//! | [`profiles`](Scene::profiles) | how the light of a luminaire was measured to depend on direction |
 //! | [`light_groups`](Scene::light_groups) | a name for the lights at a node and below |
 //! | [`linking`](Scene::linking) | what lights light, and what casts their shadows, where that is not everything |
 //! | [`medium`](Scene::medium) | the fog that fills it, or a box of it; one or none |
@@ -24,6 +25,7 @@
 //! whose origin is [`Scene::origin`].
 
 mod camera;
+mod ies_profile;
 mod light;
 mod linking;
 mod material;
@@ -41,6 +43,7 @@ mod values;
 mod visibility;
 
 pub use camera::{Camera, Projection};
+pub use ies_profile::{IesProfile, IesTable, LitCone, Pole};
 pub use light::{Light, LightKind, Shaping};
 pub use linking::{LinkRows, Linking, Links, Membership};
 pub use material::{AlphaMode, Material};
@@ -78,6 +81,8 @@ pub struct Scene {
     pub instances: Vec<Instance>,
     /// Lights that are not meshes.
     pub lights: Vec<Light>,
+    /// Photometric profiles of lights.
+    pub profiles: Vec<IesProfile>,
     /// Light groups by node: of the lights at it, and of those below that have none of their own.
     pub light_groups: BTreeMap<u32, String>,
     /// Which lights light what, and what casts shadows from them.

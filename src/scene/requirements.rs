@@ -1,6 +1,6 @@
 //! What a scene needs of the tree and the renderer.
 
-use super::{AlphaMode, Camera, Keys, LightKind, Projection, Scene, Visibility};
+use super::{AlphaMode, Camera, Keys, LightKind, Projection, Scene, Shaping, Visibility};
 use serde::Serialize;
 
 /// The features that a scene switches on. What is false or zero here costs nothing anywhere.
@@ -12,6 +12,8 @@ pub struct Requirements {
     pub textured_mesh_lights: usize,
     /// Mesh lights and other lights with an emission profile.
     pub shaped_lights: usize,
+    /// Those of them, and spots, whose profile is photometric.
+    pub photometric_lights: usize,
     /// Mesh lights and other lights whose strength varies with time.
     pub varying_lights: usize,
     /// Sphere lights sampled as spheres.
@@ -70,6 +72,7 @@ impl Requirements {
                     usize::from(instance.values.as_ref().is_some_and(Keys::varies));
                 needs.textured_mesh_lights += usize::from(material.emission_texture.is_some());
                 needs.shaped_lights += usize::from(instance.shaping.is_some());
+                needs.photometric_lights += usize::from(is_photometric(instance.shaping));
                 needs.forced += usize::from(instance.forced);
                 needs.hidden += usize::from(instance.visibility != Visibility::ALL);
             }
@@ -89,10 +92,14 @@ impl Requirements {
             needs.forced += usize::from(light.forced);
             match light.kind {
                 LightKind::Point { .. } => needs.points += 1,
-                LightKind::Spot { .. } => needs.spots += 1,
+                LightKind::Spot { shaping, .. } => {
+                    needs.spots += 1;
+                    needs.photometric_lights += usize::from(is_photometric(Some(shaping)));
+                }
                 LightKind::Sphere { shaping, .. } => {
                     needs.spheres += 1;
                     needs.shaped_lights += usize::from(shaping.is_some());
+                    needs.photometric_lights += usize::from(is_photometric(shaping));
                     needs.hidden += usize::from(light.visibility != Visibility::ALL);
                 }
                 LightKind::Distant { .. } => needs.suns += 1,
@@ -119,4 +126,8 @@ impl Requirements {
         needs.orthographic_cameras = scene.cameras.iter().filter(is_parallel).count();
         needs
     }
+}
+
+fn is_photometric(shaping: Option<Shaping>) -> bool {
+    matches!(shaping, Some(Shaping::Usd { profile: Some(_), .. }))
 }

@@ -5,9 +5,11 @@ use crate::street::{
 };
 use candelabra::diff::{Difference, Kind, Verb};
 use candelabra::scene::{
-    Channel, Interpolation, Keys, LightKind, Pixels, Shaping, Texture, TextureUse, Wrap,
+    Channel, IesProfile, IesTable, Interpolation, Keys, LightKind, Pixels, Pole, Shaping, Texture,
+    TextureUse, Wrap,
 };
 use glam::{DQuat, Vec2, Vec3};
+use std::f64::consts::TAU;
 
 fn is_near(a: f32, b: f32) -> bool {
     (a - b).abs() <= 1e-4 * b.abs().max(1e-2)
@@ -150,6 +152,29 @@ fn a_penumbra_is_a_pattern_that_only_scenes_tell() {
     });
     assert_eq!(aspects(&of_scenes, "spot"), ["pattern"]);
     assert!(of_trees.is_same());
+}
+
+#[test]
+fn a_photometric_profile_is_a_pattern() {
+    let profiled = |values: [f32; 8]| {
+        let mut scene = street();
+        let (polar_rad, around_rad) = (vec![0.0, 0.9], vec![0.0, 2.0, 4.0, TAU]);
+        let table = IesTable { pole: Pole::Nadir, polar_rad, around_rad, values: values.into() };
+        scene.profiles.push(IesProfile::new("lamp.ies".into(), table, 0.0));
+        let LightKind::Spot { shaping, .. } = &mut scene.lights[SPOT].kind else { panic!() };
+        let (softness, focus, focus_tint) = (0.0, 0.0, [0.0; 3]);
+        *shaping = Shaping::Usd { cone_rad: 0.9, softness, focus, focus_tint, profile: Some(0) };
+        scene
+    };
+    let lamp = [1.0, 2.0, 1.0, 3.0, 1.0, 2.0, 1.0, 2.0];
+    assert!(diff(profiled(lamp), profiled(lamp)).is_same());
+    // Another side is bright; or the whole lamp is brighter.
+    let turned = [1.0, 2.0, 1.0, 2.0, 1.0, 3.0, 1.0, 2.0];
+    let found = diff(profiled(lamp), profiled(turned));
+    assert!(aspects(&found, "spot").contains(&"pattern"), "{:?}", aspects(&found, "spot"));
+    let found = diff(profiled(lamp), profiled(lamp.map(|value| 2.0 * value)));
+    let told = aspects(&found, "spot");
+    assert!(told.contains(&"pattern") && told.contains(&"energy"), "{told:?}");
 }
 
 #[test]

@@ -244,6 +244,75 @@ def test_lights_without_a_carrier_are_reported(export):
     assert Gltf(result.path).lux("/P")["inputs"] == {"width": 2}
 
 
+IES = "IESNA91\nTILT=NONE\n1 -1 1 2 1 1 2 0 0 0\n1 1 1\n0 90\n0\n1 0\n"
+
+
+@pytest.mark.parametrize("out", ["scene.glb", "scene.gltf"])
+def test_an_ies_profile_is_carried_as_a_file_beside(export, tmp_path, out):
+    from conftest import Gltf
+
+    (tmp_path / "a lamp.IES").write_text(IES)
+    result = export(
+        """def RectLight "Rect" (prepend apiSchemas = ["ShapingAPI"]) {
+            asset inputs:shaping:ies:file = @a lamp.IES@
+        }
+        def SphereLight "Point" (prepend apiSchemas = ["ShapingAPI"]) {
+            bool treatAsPoint = 1
+            float inputs:shaping:cone:angle = 30
+            float inputs:shaping:ies:angleScale = -0.5
+            bool inputs:shaping:ies:normalize = 1
+            asset inputs:shaping:ies:file = @a lamp.IES@
+        }
+        def DiskLight "Dot" {
+            float inputs:radius = 0
+            bool inputs:normalize = 1
+            asset inputs:shaping:ies:file = @a lamp.IES@
+        }
+        def DistantLight "Sun" {
+            asset inputs:shaping:ies:file = @a lamp.IES@
+        }""",
+        out=out,
+    )
+    scene = Gltf(result.path)
+    rect, point, dot = (scene.lux(path)["shaping"] for path in ("/Rect", "/Point", "/Dot"))
+    assert rect["coneAngle"] == 180 and set(rect["ies"]) == {"file"}
+    assert point["coneAngle"] == 30
+    assert point["ies"] == {"file": rect["ies"]["file"], "angleScale": -0.5, "normalize": True}
+    # The cosine of a flat light that has become a point is in its focus.
+    assert dot["focus"] == 1 and dot["coneAngle"] == 90 and dot["ies"] == rect["ies"]
+    assert (result.path.parent / rect["ies"]["file"]).read_text() == IES
+    assert result.warned() == {"shaping of a DistantLight"} and "shaping" not in scene.lux("/Sun")
+
+
+def test_a_profile_keeps_that_of_the_first_frame(export, tmp_path):
+    from conftest import Gltf
+
+    (tmp_path / "lamp.ies").write_text(IES)
+    result = export(
+        """#usda 1.0
+        (
+            startTimeCode = 1
+            endTimeCode = 2
+        )
+        def SphereLight "L" (prepend apiSchemas = ["ShapingAPI"]) {
+            asset inputs:shaping:ies:file.timeSamples = { 1: @lamp.ies@, 2: @gone.ies@ }
+            float inputs:shaping:ies:angleScale.timeSamples = { 1: 2, 2: 3 }
+        }
+        def SphereLight "Bad" (prepend apiSchemas = ["ShapingAPI"]) {
+            asset inputs:shaping:ies:file = @lamp.ies@
+            float inputs:shaping:ies:angleScale = inf
+        }"""
+    )
+    ies = Gltf(result.path).lux("/L")["shaping"]["ies"]
+    assert ies["angleScale"] == 2 and ies["file"].endswith("lamp.ies")
+    assert "angleScale" not in Gltf(result.path).lux("/Bad")["shaping"]["ies"]
+    assert result.warned() == {
+        "animated inputs:shaping:ies:file",
+        "animated inputs:shaping:ies:angleScale",
+        "shaping:ies:angleScale is not finite",
+    }
+
+
 def test_animated_light_values(gltf):
     scene = gltf(
         """#usda 1.0

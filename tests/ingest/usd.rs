@@ -3,7 +3,7 @@
 use crate::files;
 use crate::files::{File, lamp};
 use candelabra::scene::{LightKind, Pixels, Projection, Scene, Shaping, Timeline, Visibility};
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 use serde_json::json;
 use std::f32::consts::{FRAC_PI_3, FRAC_PI_6};
 
@@ -65,6 +65,7 @@ fn shaping_is_usds() {
         softness: 0.5,
         focus: 2.0,
         focus_tint: [1.0, 0.0, 0.0],
+        profile: None,
     };
     let mesh = load(|file| file.lux(json!({"type": "RectLight", "shaping": shaping})));
     assert_eq!(mesh.instances[0].shaping, Some(expected));
@@ -84,6 +85,66 @@ fn shaping_is_usds() {
         panic!("{:?}", sphere.lights);
     };
     assert_eq!((cone_rad, softness), (std::f32::consts::FRAC_PI_2, 0.0), "UsdLux's defaults");
+}
+
+const IES: &str = "data:,IESNA91%0ATILT=NONE%0A1 1 1 3 1 1 1 0 0 0%0A1 1 1%0A0 60 90%0A0%0A8 8 8";
+
+#[test]
+fn a_photometric_profile_is_read_once_for_all_lights() {
+    let shaping = |ies: serde_json::Value| json!({"type": "RectLight", "shaping": {"coneAngle": 180, "ies": ies}});
+    let scene = load(|file| {
+        file.lux(shaping(json!({"file": IES})));
+        for ies in [
+            json!({"file": IES}),
+            json!({"file": IES, "angleScale": 0.5}),
+            json!({"file": IES, "normalize": true}),
+        ] {
+            let node = file.add("nodes", json!({"mesh": 0, "extras": {"usdLux": shaping(ies)}}));
+            file.json["scenes"][0]["nodes"].as_array_mut().unwrap().push(json!(node));
+        }
+    });
+    let profiles: Vec<_> = scene
+        .instances
+        .iter()
+        .map(|instance| match instance.shaping {
+            Some(Shaping::Usd { profile, .. }) => profile,
+            _ => None,
+        })
+        .collect();
+    assert_eq!(profiles, [Some(0), Some(0), Some(1), Some(2)]);
+    let at = |row: usize, degrees: f64| {
+        let (sin, cos) = degrees.to_radians().sin_cos();
+        scene.profiles[row].factor(DVec3::new(sin, 0.0, -cos))
+    };
+    // Dark beyond its last angle; scaled; and of the mean 1 over the hemisphere that it has.
+    assert_eq!((at(0, 80.0), at(0, 95.0)), (8.0, 0.0));
+    assert_eq!((at(1, 40.0), at(1, 50.0)), (8.0, 0.0));
+    assert!((at(2, 80.0) - 1.0).abs() < 1e-6);
+    assert_eq!(scene.requirements().photometric_lights, 4);
+    assert!(scene.notes.is_empty(), "{:?}", scene.notes);
+}
+
+#[test]
+fn a_profile_that_cannot_be_read_is_noted_and_left_out() {
+    let bad = IES.replace("0 60 90", "0 60 60");
+    for (uri, expected) in [
+        (
+            bad.as_str(),
+            "line 5: a vertical angle, 60, does not ascend from 60; its lights shine without it",
+        ),
+        ("gone.ies", "cannot be read"),
+        ("../lamp.ies", "outside the scene's folder"),
+        ("data:,nothing", "no line TILT="),
+    ] {
+        let lux = json!({"type": "RectLight", "shaping": {"coneAngle": 40, "ies": {"file": uri}}});
+        let scene = load(|file| file.lux(lux));
+        let Some(Shaping::Usd { profile: None, .. }) = scene.instances[0].shaping else {
+            panic!("{:?}", scene.instances[0].shaping);
+        };
+        let note = &scene.notes[0];
+        assert!(note.text.contains(expected), "{note:?}");
+        assert!(note.text.contains("IES profile"), "{note:?}");
+    }
 }
 
 #[test]

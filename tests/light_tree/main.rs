@@ -5,6 +5,7 @@ mod city;
 mod darkness;
 mod expected;
 mod extremes;
+mod far_field;
 mod frames;
 mod glossy;
 mod importance;

@@ -4,8 +4,8 @@ use candelabra::emitter::Emitters;
 use candelabra::light_tree::LightTree;
 use candelabra::pipeline::{self, StaleTree, TreeError};
 use candelabra::scene::{
-    Camera, Channel, Instance, Interpolation, Keys, Light, LightKind, Material, Medium, Mesh, Node,
-    Pixels, Scene, Shaping, Texture, TextureUse, Trs, Wrap,
+    Camera, Channel, IesProfile, IesTable, Instance, Interpolation, Keys, Light, LightKind,
+    Material, Medium, Mesh, Node, Pixels, Pole, Scene, Shaping, Texture, TextureUse, Trs, Wrap,
 };
 use glam::{DQuat, DVec3, Quat, Vec2, Vec3};
 use std::f32::consts::PI;
@@ -77,7 +77,13 @@ fn street() -> Scene {
     }
     let intensity_cd = Vec3::new(1.0, 2.0, 3.0);
     let khr = Shaping::Khr { inner_rad: 0.2, outer_rad: 0.5 };
-    let usd = Shaping::Usd { cone_rad: 1.0, softness: 0.5, focus: 0.0, focus_tint: [0.0; 3] };
+    let usd = Shaping::Usd {
+        cone_rad: 1.0,
+        softness: 0.5,
+        focus: 0.0,
+        focus_tint: [0.0; 3],
+        profile: None,
+    };
     for (path, kind) in [
         ("/bulb", LightKind::Point { intensity_cd }),
         ("/torch", LightKind::Spot { intensity_cd, shaping: khr }),
@@ -221,6 +227,14 @@ fn an_edit_of_a_light_makes_it_stale_and_names_the_light() {
         ("profile", "/moon", |s| {
             let LightKind::Sphere { shaping, .. } = &mut s.lights[MOON].kind else { return };
             *shaping = None;
+        }),
+        ("photometric profile", "/moon", |s| {
+            let (polar_rad, around_rad, values) = (vec![0.0, 1.0], vec![0.0], vec![1.0, 2.0]);
+            let table = IesTable { pole: Pole::Nadir, polar_rad, around_rad, values };
+            s.profiles.push(IesProfile::new("moon.ies".into(), table, 0.0));
+            let LightKind::Sphere { shaping, .. } = &mut s.lights[MOON].kind else { return };
+            let Some(Shaping::Usd { profile, .. }) = shaping else { return };
+            *profile = Some(0);
         }),
         ("the way", "/tram", |s| {
             *channels(s, "/tram") = vec![Channel::Translation(keys([Vec3::ZERO, Vec3::Y]))];

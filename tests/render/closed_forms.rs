@@ -3,7 +3,7 @@
 use crate::stage::{Stage, aimed, at, direct, facing, glow, lambert, picture, scaled};
 use crate::statistics::assert_even;
 use candelabra::render::RenderSettings;
-use candelabra::scene::{AlphaMode, LightKind, Material, Shaping};
+use candelabra::scene::{AlphaMode, IesProfile, IesTable, LightKind, Material, Pole, Shaping};
 use glam::{DVec3, Vec3};
 use std::f64::consts::{FRAC_PI_3, PI};
 
@@ -214,6 +214,7 @@ fn spots_on_the_axis_in_the_ramp_and_outside() {
         softness: soft as f32,
         focus: 2.0,
         focus_tint: [0.0; 3],
+        profile: None,
     };
     let ramp = |angle: f64| {
         let line = (angle.cos() - outer.cos()) / (inner.cos() - outer.cos());
@@ -256,6 +257,67 @@ fn spots_on_the_axis_in_the_ramp_and_outside() {
             assert_irradiance(&named("sphere"), &sphere, of_sphere * factor);
             let of_mesh = 1e4 * f64::from(panel_side).powi(2) * angle.cos() / 4.0;
             assert_irradiance(&named("mesh"), &mesh, of_mesh * factor);
+        }
+    }
+}
+
+/// A photometric profile that is a power of the cosine, on every kind of light that may have one, and however it hangs.
+#[test]
+fn a_profile_of_cosines_is_a_focus() {
+    let fourth = |theta: f64| theta.cos().max(0.0).powi(4);
+    let angles: Vec<f64> = (0..=1440).map(|i| PI * f64::from(i) / 1440.0).collect();
+    let values = angles.iter().map(|&theta| fourth(theta) as f32).collect();
+    let table = IesTable { pole: Pole::Nadir, polar_rad: angles, around_rad: vec![0.0], values };
+    let profile = IesProfile::new("cosines.ies".into(), table, 0.0);
+    let shaping = |profile, focus| Shaping::Usd {
+        cone_rad: PI as f32,
+        softness: 0.0,
+        focus,
+        focus_tint: [0.0; 3],
+        profile,
+    };
+    for angle in [0.3, 1.2] {
+        let place = DVec3::Y * 2.0;
+        let target = place + DVec3::new(f64::sin(angle), -f64::cos(angle), 0.0);
+        // The focus and the profile multiply.
+        for (ies, focus) in [(true, 0.0), (false, 4.0), (true, 3.0)] {
+            let shaping = shaping(ies.then_some(0), focus);
+            let factor = if ies { fourth(angle) } else { 1.0 } * angle.cos().powf(f64::from(focus));
+            let lit = |light: &dyn Fn(&mut Stage), expected: f64, kind: &str| {
+                let mut stage = receiver(DVec3::Y);
+                stage.scene.profiles.push(profile.clone());
+                light(&mut stage);
+                assert_irradiance(
+                    &format!("a {kind} at {angle} rad, {ies} {focus}"),
+                    &stage,
+                    expected * factor,
+                );
+            };
+            let spot = LightKind::Spot { intensity_cd: Vec3::splat(10.0), shaping };
+            lit(
+                &|stage| {
+                    stage.light(spot.clone(), aimed(place, target));
+                },
+                10.0 / 4.0,
+                "point",
+            );
+            let radiance_nits = Vec3::splat(1e4);
+            let sphere = LightKind::Sphere { radiance_nits, radius: 0.01, shaping: Some(shaping) };
+            let of_sphere = 1e4 * PI * 0.01f64.powi(2) / 4.0;
+            lit(
+                &|stage| {
+                    stage.light(sphere.clone(), aimed(place, target));
+                },
+                of_sphere,
+                "sphere",
+            );
+            let panel = |stage: &mut Stage| {
+                let material = Material { double_sided: true, ..glow(radiance_nits) };
+                // Sizes, even uneven ones, turn no profile.
+                let place = scaled(aimed(place, target), DVec3::new(0.5, 2.0, 1.0));
+                stage.quad([0.01; 2], material, place).shaping = Some(shaping);
+            };
+            lit(&panel, 1e4 * 1e-4 * angle.cos() / 4.0, "panel");
         }
     }
 }

@@ -98,7 +98,7 @@ fn spots_of_every_width_light_their_axis() {
         let khr = |inner: f32| Shaping::Khr { inner_rad: inner, outer_rad: half_angle };
         let usd = |softness, focus| {
             let focus_tint = [0.0; 3];
-            Shaping::Usd { cone_rad: half_angle, softness, focus, focus_tint }
+            Shaping::Usd { cone_rad: half_angle, softness, focus, focus_tint, profile: None }
         };
         let square = (distance * distance) as f32;
         let profiles =

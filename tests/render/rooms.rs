@@ -5,9 +5,11 @@
 
 use crate::stage::{Stage, aimed, at, facing, glow, lambert, picture, scaled};
 use candelabra::scene::{
-    AlphaMode, LightKind, Material, Node, Pixels, Shaping, Texture, TextureUse, Wrap,
+    AlphaMode, IesProfile, IesTable, LightKind, Material, Node, Pixels, Pole, Shaping, Texture,
+    TextureUse, Wrap,
 };
 use glam::{DVec3, Vec3};
+use std::f64::consts::{PI, TAU};
 
 /// A scene, and how many bounces of it are looked at.
 pub struct Room {
@@ -48,9 +50,55 @@ fn sphere(radiance: Vec3, radius: f32, shaping: Option<Shaping>) -> LightKind {
     LightKind::Sphere { radiance_nits: radiance, radius, shaping }
 }
 
-const USD: Shaping =
-    Shaping::Usd { cone_rad: 0.9, softness: 0.4, focus: 3.0, focus_tint: [0.5, 0.1, 0.0] };
+const USD: Shaping = Shaping::Usd {
+    cone_rad: 0.9,
+    softness: 0.4,
+    focus: 3.0,
+    focus_tint: [0.5, 0.1, 0.0],
+    profile: None,
+};
 const KHR: Shaping = Shaping::Khr { inner_rad: 0.3, outer_rad: 0.8 };
+
+/// A lamp with a narrow peak, a wide skirt and a dark side.
+fn photometric(stage: &mut Stage) -> Shaping {
+    let (rows, planes) = (37, 25);
+    let angles =
+        |count: usize, most: f64| (0..count).map(move |i| most * i as f64 / (count - 1) as f64);
+    let value = |theta: f64, phi: f64| {
+        let side = (1.0 + phi.cos()).max(0.0);
+        ((-40.0 * theta * theta).exp() * 9.0 + 0.4 * theta.cos().max(0.0) * side) as f32
+    };
+    let values =
+        angles(planes, TAU).flat_map(|phi| angles(rows, PI).map(move |theta| value(theta, phi)));
+    let table = IesTable {
+        pole: Pole::Nadir,
+        polar_rad: angles(rows, PI).collect(),
+        around_rad: angles(planes, TAU).collect(),
+        values: values.collect(),
+    };
+    stage.scene.profiles.push(IesProfile::new("lamp.ies".into(), table, 0.0));
+    let profile = Some(stage.scene.profiles.len() as u32 - 1);
+    Shaping::Usd { cone_rad: 2.0, softness: 0.2, focus: 0.0, focus_tint: [0.0; 3], profile }
+}
+
+/// Points, spheres and a panel of such lamps, some of which aim elsewhere.
+fn photometric_lights(stage: &mut Stage) {
+    let shaping = photometric(stage);
+    spot(stage, shaping);
+    spheres(stage, Some(shaping));
+    for i in 0..12 {
+        let turn = f64::from(i);
+        let place = DVec3::new(1.3 * turn.cos(), 0.5 + 0.07 * turn, 0.9 * turn.sin());
+        let target = DVec3::new(0.8 * (2.0 * turn).sin(), 0.0, 0.6 * (3.0 * turn).cos());
+        let kind =
+            LightKind::Spot { intensity_cd: Vec3::new(0.3, 0.2 + 0.02 * i as f32, 0.4), shaping };
+        stage.light(kind, aimed(place, target));
+    }
+    let place = aimed(DVec3::new(0.1, 1.1, 0.3), DVec3::new(0.3, 0.0, 0.2));
+    let material = Material { double_sided: true, ..glow(Vec3::new(2.0, 3.0, 4.0)) };
+    stage.quad([0.4; 2], material, place).shaping = Some(shaping);
+    point(stage);
+}
 
 /// Panels around the floor, some of which turn their backs to it.
 fn mesh_lights(stage: &mut Stage, double_sided: bool) {
@@ -155,10 +203,16 @@ pub fn of_every_light() -> Vec<Room> {
         on_plaster("points with ranges", &points_with_ranges),
         on_plaster("glTF's spots", &|stage| spot(stage, KHR)),
         on_plaster("USD's spots", &|stage| spot(stage, USD)),
+        on_plaster("photometric lights", &photometric_lights),
         on_plaster("spots with hard edges", &|stage| {
             spot(stage, Shaping::Khr { inner_rad: 0.39, outer_rad: 0.4 });
-            let hard =
-                Shaping::Usd { cone_rad: 0.5, softness: 0.0, focus: 0.0, focus_tint: [0.0; 3] };
+            let hard = Shaping::Usd {
+                cone_rad: 0.5,
+                softness: 0.0,
+                focus: 0.0,
+                focus_tint: [0.0; 3],
+                profile: None,
+            };
             spheres(stage, Some(hard));
         }),
         on_plaster("suns without size", &|stage| sun(stage, 0.0)),

@@ -4,6 +4,7 @@ use super::document::{Real, Transform, UsdFog, UsdLux, label, usd_path};
 use super::geometry::Meshes;
 use super::lights::{self, Placed};
 use super::links::LinkTable;
+use super::profiles::Profiles;
 use super::{Output, Source, animation, cameras, fog, instancing};
 use crate::ingest::error::Fault;
 use crate::ingest::paths::{PrimPaths, component};
@@ -37,6 +38,7 @@ struct Walk<'a> {
     meshes: Meshes,
     paths: PrimPaths,
     links: LinkTable,
+    profiles: Profiles,
     /// For each node of the scene, whether neither it nor an ancestor ever scales unevenly.
     uniform: Vec<bool>,
 }
@@ -50,6 +52,7 @@ pub(super) fn compile(source: &Source, output: &mut Output) -> Result<(), Fault>
         meshes: Meshes::new(source),
         paths: PrimPaths::default(),
         links: LinkTable::default(),
+        profiles: Profiles::default(),
         uniform: Vec::new(),
     };
     // A stack, so that no depth of the hierarchy is a depth of calls.
@@ -152,14 +155,15 @@ impl Walk<'_> {
             output.scene.light_groups.insert(node, group.clone());
         }
         let mut values = lights::values(lux.as_ref(), object)?;
-        let light = lights::of_node(self.source, output, number, lux.as_ref(), node, object)?
+        let shaping = self.profiles.shaping(self.source, output, lux.as_ref(), object)?;
+        let told = (lux.as_ref(), shaping);
+        let light = lights::of_node(self.source, output, number, told, node, object)?
             .map(|light| Light { values: values.take(), ..light });
         let has_light = light.is_some();
         if has_light {
             self.links.add_light(output, links)?;
         }
         output.scene.lights.extend(light);
-        let shaping = lights::shaping(lux.as_ref(), object)?;
         let forced = lux.as_ref().is_some_and(|lux| lux.force);
         let document = self.source.document;
         let instances = document.beside.instances.get(&number);

@@ -59,7 +59,7 @@ pub(super) fn of_node(
     source: &Source,
     output: &mut Output,
     number: usize,
-    lux: Option<&UsdLux>,
+    (lux, shaping): (Option<&UsdLux>, Option<Shaping>),
     node: u32,
     object: &str,
 ) -> Result<Option<Light>, Fault> {
@@ -79,7 +79,6 @@ pub(super) fn of_node(
         output.notes.add(Category::Lights, object, "its light is not in the file; left out");
         return Ok(None);
     };
-    let shaping = shaping(lux, object)?;
     let angle = lux.and_then(|lux| lux.angle).map_or(0.0, |angle| angle.f32());
     if !(0.0..=360.0).contains(&angle) {
         return Err(Fault::new(object, "extras.usdLux: angle is not in [0, 360]"));
@@ -174,24 +173,6 @@ pub(super) fn values(lux: Option<&UsdLux>, object: &str) -> Result<Option<Keys<R
         return fault("an rgb value is negative".into());
     }
     Ok(Some(Keys { times_s, values, interpolation: Interpolation::Linear }.settled()))
-}
-
-/// The emission profile that `extras.usdLux` gives.
-pub(super) fn shaping(lux: Option<&UsdLux>, object: &str) -> Result<Option<Shaping>, Fault> {
-    let Some(shaping) = lux.and_then(|lux| lux.shaping.as_ref()) else { return Ok(None) };
-    // UsdLux's own default.
-    let cone = shaping.cone_angle.map_or(90.0, |angle| angle.f32());
-    let tint = reals(shaping.focus_tint);
-    if cone < 0.0 || tint.iter().any(|&part| part < 0.0) {
-        return Err(Fault::new(object, "extras.usdLux: shaping has a negative cone or tint"));
-    }
-    Ok(Some(Shaping::Usd {
-        cone_rad: cone.to_radians(),
-        softness: shaping.cone_softness.f32().clamp(0.0, 1.0),
-        // A negative focus is ignored by UsdLux's definition.
-        focus: shaping.focus.f32().max(0.0),
-        focus_tint: tint,
-    }))
 }
 
 /// The sphere light that a tessellated mesh of this material stands for; constant.

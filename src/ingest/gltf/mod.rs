@@ -35,6 +35,7 @@ mod instancing;
 mod lights;
 mod links;
 mod materials;
+mod profiles;
 mod textures;
 
 use super::budget::Budget;

@@ -118,6 +118,7 @@ pub struct Linked<V> {
 
 impl<V: Viewer> Viewer for Linked<V> {
     const IS_LINKED: bool = true;
+    const IS_ORIENTED: bool = V::IS_ORIENTED;
 
     #[inline(always)]
     fn class(&self) -> ReceiverClass {

@@ -82,6 +82,19 @@ pub(in crate::ingest::gltf) struct UsdShaping {
     pub focus: Real,
     #[serde(default)]
     pub focus_tint: [Real; 3],
+    pub ies: Option<UsdIes>,
+}
+
+/// `extras.usdLux.shaping.ies`: a photometric profile.
+#[derive(Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub(in crate::ingest::gltf) struct UsdIes {
+    /// URI, relative to the file.
+    pub file: String,
+    #[serde(default)]
+    pub angle_scale: Real,
+    #[serde(default)]
+    pub normalize: bool,
 }
 
 /// `extras.usdLinks`: the link sets that geometry is in, or those that it is not in.

@@ -10,7 +10,9 @@ mod real;
 mod reference;
 
 pub(super) use beside::{Beside, Instancing, Target, Transform};
-pub(super) use extras::{AssetUsd, UsdCamera, UsdFog, UsdLinks, UsdLux, UsdValues, usd_path};
+pub(super) use extras::{
+    AssetUsd, UsdCamera, UsdFog, UsdIes, UsdLinks, UsdLux, UsdValues, usd_path,
+};
 pub(super) use real::{Real, reals};
 
 use crate::ingest::budget::Budget;
