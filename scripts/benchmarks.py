@@ -102,14 +102,27 @@ def what_is_paid(quick):
     return table(told([sys.executable, "scripts/what_is_paid.py"] + ["--quick"] * quick, judges=True))
 
 
+def profile(quick):
+    told(["cargo", "build", "--release", "--quiet", "--bins"])
+    names = ["lamps_10"] if quick else ["spiral_points", "spiral_mesh", "lamps_10", "lamps_1000"]
+    with tempfile.TemporaryDirectory() as folder:
+        make = '. scripts/environment.sh; environment scripts/requirements.txt; "$python" scenes/seed/make.py --output "$@"'
+        told(["sh", "-c", make, "make", folder, *names])
+        scenes = [Path(folder) / f"{name}.glb" for name in names]
+        command = [sys.executable, "scripts/profile.py", TARGET / "release", *scenes, "--options"]
+        one, default = (table(told([*command, options])) for options in ("--split 0 --depth 1", "--depth 5"))
+    return f"Direct light, one light at a point:\n\n{one}\n\nFive bounces, the default knob:\n\n{default}"
+
+
 BLOCKS = {
     "costs": (costs, "cargo bench --bench light_tree"),
     "one_changed": (one_changed, "cargo bench --bench light_tree"),
     "break_even": (break_even, "cargo bench --bench break_even"),
     "one_frame": (one_frame, "python3 scripts/one_frame.py target/release"),
+    "profile": (profile, "python3 scripts/profile.py target/release SCENE..."),
     "what_is_paid": (what_is_paid, "python3 scripts/what_is_paid.py"),
 }
-FILES = ("README.md", "docs/measurements.md", "docs/one_frame.md")
+FILES = ("README.md", "docs/measurements.md", "docs/one_frame.md", "docs/profile.md")
 
 
 def machine():
