@@ -194,7 +194,7 @@ impl FrameTree<'_> {
                 scratch.open.push(Opened { stop, leg, weight: 1.0, opened: 1.0, cap: 1.0 });
                 (variance, wanted) = self.open_clusters(beside, how, route, scratch);
             } else {
-                let weight = if beside.is_empty() { 1.0 } else { self.weight_of_root(&place) };
+                let weight = self.weight_of_root(&place);
                 if weight > 0.0 {
                     wanted = leg.map(|leg| (scratch.entries.len(), leg));
                     scratch.push(Entry::Cluster(stop), weight, 1.0);
@@ -223,7 +223,7 @@ impl FrameTree<'_> {
         Some(Cut { rounded, wanted })
     }
 
-    /// The importance of everything in the tree, to compare with that of lights beside it.
+    /// The importance of everything in the tree; 0 if nothing of it can arrive.
     fn weight_of_root<V: Viewer>(&self, place: &Place<V>) -> f64 {
         // What is hidden, not linked or measured is known of the root's children, not of the root.
         let is_known = (V::IS_LINKED && self.links.is_some()) || self.fields.is_some();

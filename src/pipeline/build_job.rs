@@ -6,7 +6,7 @@
 
 use super::agreement::{Standing, standing};
 use super::build::{Rebuilt, build_tree, rebuild_tree};
-use super::fresh::{OpenedTree, TreeError, check_output, open_base};
+use super::fresh::{OpenedTree, TreeError, build_options, check_output, open_base};
 use super::read::read_scene;
 use super::{
     Event, ReadError, ShotTrees, StageOptions, Strict, Survey, TreeChoice, Watch, collect_emitters,
@@ -318,7 +318,7 @@ impl BuildJob {
         built?;
         let choice = TreeChoice {
             file: Some(output.into()),
-            forced: self.force_light.clone(),
+            options: build_options(&self.force_light, &self.stage),
             verify: true,
         };
         let (checked, with) = timed(|| {

@@ -3,7 +3,7 @@
 use super::agreement::{Contradiction, find_contradiction};
 use super::build::algorithm_of;
 use super::frames::spell;
-use super::{Survey, frames_of, survey};
+use super::{StageOptions, Survey, frames_of, survey};
 use crate::emitter::{Emitters, LightOverflow};
 use crate::light_tree::{ALGORITHM_VERSION, LightSummary, LightTree, NoSuchFrame, SameLinks};
 use crate::scene::Scene;
@@ -199,14 +199,14 @@ pub fn check_fresh<D: AsRef<[u8]> + Sync>(
     path: &Path,
     scene: &Scene,
     emitters: &Emitters,
-    forced: &[String],
+    options: &[String],
     leaves: bool,
 ) -> Result<(), TreeError> {
     let survey = survey(scene, emitters, &frames_in(tree))?;
     if survey.fingerprint != tree.fingerprint() {
-        return Err(stale_by(tree, path, scene, &survey, forced));
+        return Err(stale_by(tree, path, scene, &survey, options));
     }
-    check_agreement(tree, path, scene, &survey, forced, leaves)
+    check_agreement(tree, path, scene, &survey, options, leaves)
 }
 
 /// Refuses a tree that has a survey's fingerprint but contradicts the survey. A tree with another
@@ -219,7 +219,7 @@ pub fn check_agreement<D: AsRef<[u8]> + Sync>(
     path: &Path,
     scene: &Scene,
     survey: &Survey,
-    forced: &[String],
+    options: &[String],
     leaves: bool,
 ) -> Result<(), TreeError> {
     if survey.fingerprint != tree.fingerprint() {
@@ -227,7 +227,7 @@ pub fn check_agreement<D: AsRef<[u8]> + Sync>(
     }
     match find_contradiction(tree, survey, leaves) {
         None => Ok(()),
-        Some(cause) => Err(contradicts(tree, path, scene, forced, cause)),
+        Some(cause) => Err(contradicts(tree, path, scene, options, cause)),
     }
 }
 
@@ -241,10 +241,10 @@ pub(super) fn stale<D: AsRef<[u8]>>(
     path: &Path,
     scene: &Scene,
     emitters: &Emitters,
-    forced: &[String],
+    options: &[String],
 ) -> Result<TreeError, TreeError> {
     let survey = survey(scene, emitters, &frames_in(tree))?;
-    Ok(stale_by(tree, path, scene, &survey, forced))
+    Ok(stale_by(tree, path, scene, &survey, options))
 }
 
 fn stale_by<D: AsRef<[u8]>>(
@@ -252,9 +252,9 @@ fn stale_by<D: AsRef<[u8]>>(
     path: &Path,
     scene: &Scene,
     survey: &Survey,
-    forced: &[String],
+    options: &[String],
 ) -> TreeError {
-    let remedy = build_command(scene, path, &frames_in(tree), forced);
+    let remedy = build_command(scene, path, &frames_in(tree), options);
     TreeError::Stale { path: path.into(), cause: compare(tree, &survey.lights, remedy) }
 }
 
@@ -263,10 +263,10 @@ pub(super) fn contradicts<D: AsRef<[u8]>>(
     tree: &LightTree<D>,
     path: &Path,
     scene: &Scene,
-    forced: &[String],
+    options: &[String],
     cause: Contradiction,
 ) -> TreeError {
-    let remedy = build_command(scene, path, &frames_in(tree), forced);
+    let remedy = build_command(scene, path, &frames_in(tree), options);
     TreeError::Contradicts { path: path.into(), cause, remedy }
 }
 
@@ -274,17 +274,21 @@ fn frames_in<D: AsRef<[u8]>>(tree: &LightTree<D>) -> Vec<i32> {
     tree.frames().iter().map(|row| row.frame).collect()
 }
 
-/// The command that builds a tree again for the frames that it was built for.
-fn build_command(scene: &Scene, tree: &Path, frames: &[i32], forced: &[String]) -> String {
+/// What `candelabra build` is told of how a scene is meant: the lights that are forced, and what of a USD stage is meant.
+pub(super) fn build_options(forced: &[String], stage: &StageOptions) -> Vec<String> {
+    let forced = forced.iter().flat_map(|path| ["--force-light".into(), path.clone()]);
+    forced.chain(stage.arguments()).collect()
+}
+
+/// The command that builds a tree again for the frames that it was built for, with [`build_options`].
+fn build_command(scene: &Scene, tree: &Path, frames: &[i32], options: &[String]) -> String {
     let name = |path: &Path| path.display().to_string();
     let mut words = ["candelabra", "build"].map(String::from).to_vec();
     words.extend([name(&scene.source), "-o".into(), name(tree)]);
     if !frames.is_empty() && frames != frames_of(scene) {
         words.extend(["--frames".into(), spell(frames)]);
     }
-    for path in forced {
-        words.extend(["--force-light".into(), path.clone()]);
-    }
+    words.extend(options.iter().cloned());
     shlex::try_join(words.iter().map(String::as_str)).unwrap_or_else(|_| words.join(" "))
 }
 

@@ -1,5 +1,6 @@
 //! The job of `candelabra learn`: a scene and its tree in, a table of what is seen out.
 
+use super::fresh::build_options;
 use super::learn_budget::{Budget, Trials};
 use super::learned::{LearnedError, open_learned};
 use super::read::read_scene;
@@ -129,8 +130,11 @@ impl LearnJob {
         let all = self.frames.as_ref().map_or(frames_of(&scene), |f| f.as_slice().to_vec());
         let frames = spread(&all);
         stage("looking at the light tree");
-        let choice =
-            TreeChoice { file: self.tree.clone(), forced: self.force_lights.clone(), verify: true };
+        let choice = TreeChoice {
+            file: self.tree.clone(),
+            options: build_options(&self.force_lights, &self.stage),
+            verify: true,
+        };
         let (lesson, budget, learning) =
             with_trees(&scene, &choice, &|_, _| (), |emitters, mut trees| {
                 stage("preparing rays");

@@ -35,8 +35,8 @@ pub struct TreeFile<'a> {
     pub tree: LightTree<&'a [u8]>,
     /// Where it is.
     pub path: &'a Path,
-    /// What the user forces in addition to what the scene forces; commands in messages repeat it.
-    pub forced: &'a [String],
+    /// What `candelabra build` is told of how the scene is meant; commands in messages repeat it.
+    pub options: &'a [String],
     /// Whether to prove what a frame samples, and to compare its leaves with the scene's lights.
     pub verify: bool,
     /// The file itself, if the tree is mapped: it tells whether somebody writes to it.
@@ -122,11 +122,11 @@ impl CheckedFile<'_> {
         if fingerprint::of_shot(&surveyor.still_fingerprint, prints) != tree.fingerprint() {
             return Err(self.stale()?);
         }
-        let TreeFile { path, forced, .. } = self.file;
+        let TreeFile { path, options, .. } = self.file;
         let agreement = self.agreement(surveyor, &[]);
         let of_links = || agreement.of_links(self.emitters);
         match agreement.of_numbering(self.emitters).or_else(of_links) {
-            Some(cause) => Err(contradicts(tree, path, self.scene, forced, cause)),
+            Some(cause) => Err(contradicts(tree, path, self.scene, options, cause)),
             None => Ok(()),
         }
     }
@@ -142,7 +142,7 @@ impl CheckedFile<'_> {
         }
         let frame = self.fresh(surveyor, number)?;
         if self.file.verify {
-            let TreeFile { tree, path, forced, .. } = &self.file;
+            let TreeFile { tree, path, options, .. } = &self.file;
             tree.verify_frame(number)
                 .map_err(|cause| TreeError::Broken { path: (*path).into(), cause })?;
             let agreement = self.agreement(surveyor, frame.as_slice());
@@ -152,7 +152,7 @@ impl CheckedFile<'_> {
             };
             let of_frame = || agreement.of_frame(frame.as_ref()?);
             if let Some(cause) = still.or_else(of_frame) {
-                return Err(contradicts(tree, path, self.scene, forced, cause));
+                return Err(contradicts(tree, path, self.scene, options, cause));
             }
             self.is_still_checked = true;
         }
@@ -182,8 +182,8 @@ impl CheckedFile<'_> {
     }
 
     fn stale(&self) -> Result<TreeError, TreeError> {
-        let TreeFile { tree, path, forced, .. } = &self.file;
-        stale(tree, path, self.scene, self.emitters, forced)
+        let TreeFile { tree, path, options, .. } = &self.file;
+        stale(tree, path, self.scene, self.emitters, options)
     }
 
     fn agreement<'s>(
@@ -264,8 +264,8 @@ impl BuiltTrees {
 pub struct TreeChoice {
     /// A tree file; if there is none, trees are built.
     pub file: Option<PathBuf>,
-    /// What the user forces in addition to what the scene forces.
-    pub forced: Vec<String>,
+    /// What `candelabra build` is told of how the scene is meant; commands in messages repeat it.
+    pub options: Vec<String>,
     /// Whether to prove what a frame samples of the file, and to compare its leaves with the scene's lights.
     pub verify: bool,
 }
@@ -290,7 +290,7 @@ pub fn with_trees<T, E: From<TreeError>>(
             let file = TreeFile {
                 tree: tree.by_reference(),
                 path,
-                forced: &choice.forced,
+                options: &choice.options,
                 verify: choice.verify,
                 mapped: Some(tree.data()),
             };

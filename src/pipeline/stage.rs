@@ -1,13 +1,14 @@
 //! USD stages: exported to glTF where a job is given one, by `scripts/usd_to_gltf.py`.
 //!
-//! As with usdrecord nothing is left behind: the export goes to a temporary folder, and is gone when it has been read.
+//! As with usdrecord nothing is left behind: the export goes to a temporary folder, and is gone when it has been read. (A
+//! program that is killed leaves the folder, `candelabra-*`, to those who clear temporary files.)
 //! [`StageOptions`] are usdrecord's and the exporter's own, and are handed on as they are. What the exporter says is told
 //! as notes; what it refuses is the error, in its words.
 //!
 //! | variable of the environment | |
 //! |---|---|
 //! | `CANDELABRA_PYTHON` | the Python that runs the exporter; else the active virtual environment's, the project's own, `python3` |
-//! | `CANDELABRA_EXPORTER` | the exporter; else `scripts/usd_to_gltf.py` in one of the folders above the program |
+//! | `CANDELABRA_EXPORTER` | the exporter; else `scripts/usd_to_gltf.py` in one of the four folders above the program |
 
 use super::{Event, Strict, Watch};
 use crate::scene::SourceFile;
@@ -23,6 +24,8 @@ use tempfile::TempDir;
 const PYTHON: &str = "CANDELABRA_PYTHON";
 const EXPORTER: &str = "CANDELABRA_EXPORTER";
 const SCRIPT: &str = "scripts/usd_to_gltf.py";
+/// A program is in `bin` or in `target/release` of the folder that has the scripts, or a folder deeper.
+const FOLDERS_ABOVE: usize = 4;
 /// The exit code of the exporter for options that it does not take.
 const USAGE: i32 = 2;
 /// How long a stopped job may take to notice it.
@@ -59,7 +62,7 @@ impl StageOptions {
     }
 
     /// As arguments of the exporter.
-    fn arguments(&self) -> Vec<String> {
+    pub(super) fn arguments(&self) -> Vec<String> {
         let given = [
             ("--purposes", &self.purposes),
             ("--mask", &self.mask),
@@ -257,8 +260,9 @@ fn exporter(scene: &Path) -> Result<PathBuf, StageError> {
         return if path.is_file() { Ok(path) } else { Err(missing(Some(path))) };
     }
     let program = env::current_exe().unwrap_or_default();
-    let above = program.ancestors().skip(1).map(|folder| folder.join(SCRIPT));
-    above.into_iter().find(|path| path.is_file()).ok_or_else(|| missing(None))
+    let above = program.ancestors().skip(1).take(FOLDERS_ABOVE);
+    let mut scripts = above.map(|folder| folder.join(SCRIPT));
+    scripts.find(|path| path.is_file()).ok_or_else(|| missing(None))
 }
 
 /// The Python that runs it.

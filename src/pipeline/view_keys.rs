@@ -1,7 +1,7 @@
 //! Keys of what a table of what is hidden is learned from, beside its tree.
 //!
 //! Each tells apart what the others do not, so that a table that is out of date can say why. None depends on names, on
-//! the order in which meshes are listed or on how bright anything is: that does not change what is seen from
+//! the order in which meshes are listed or on how bright what shines is: that does not change what is seen from
 //! where.
 
 use crate::light_tree::learned::ViewKeys;
@@ -66,10 +66,11 @@ fn add_channel(hasher: &mut Hasher, channel: &Channel) {
     }
 }
 
-/// Lights at infinity, in the order of their rows: weights are told by row.
+/// Lights at infinity, in the order of their rows: weights are told by row. One that never shines has none.
 fn infinite(scene: &Scene, places: &[Key]) -> Key {
     let mut hasher = Hasher::new();
-    for light in &scene.lights {
+    let shines = |row: u32| scene.peak_rgb_of_light(row).max_element() > 0.0;
+    for (_, light) in (0..).zip(&scene.lights).filter(|&(row, _)| shines(row)) {
         let text = match light.kind {
             LightKind::Distant { angle_rad, .. } => format!("sun {angle_rad}"),
             LightKind::Dome { texture: Some(texture), .. } => {

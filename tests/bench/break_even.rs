@@ -56,7 +56,7 @@ fn row(folder: &std::path::Path, count: u32) -> String {
         let file = TreeFile {
             tree: tree.by_reference(),
             path: &path,
-            forced: &[],
+            options: &[],
             verify: true,
             mapped: None,
         };

@@ -143,7 +143,7 @@ fn whatever_passes_has_the_scenes_leaves() {
                 let file = TreeFile {
                     tree: tree.by_reference(),
                     path,
-                    forced: &[],
+                    options: &[],
                     verify: true,
                     mapped: None,
                 };
@@ -222,7 +222,7 @@ fn whatever_passes_in_a_frame_has_the_scenes_leaves_there() {
             let file = TreeFile {
                 tree: tree.by_reference(),
                 path,
-                forced: &[],
+                options: &[],
                 verify: true,
                 mapped: None,
             };

@@ -22,7 +22,7 @@ fn file(tree: &Tree) -> TreeFile<'_> {
     TreeFile {
         tree: tree.by_reference(),
         path: Path::new("a.ltree"),
-        forced: &[],
+        options: &[],
         verify: true,
         mapped: None,
     }

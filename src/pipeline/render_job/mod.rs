@@ -30,6 +30,7 @@ pub use frame_noise::{Audit, FrameNoise};
 pub use plan::Plan;
 pub use report::{FrameCounts, RenderReport, SceneCounts, Seconds};
 
+use super::fresh::build_options;
 use super::{
     Event, PreviewStamp, StageOptions, Stamp, Strict, TreeChoice, View, Watch, open_learned,
     with_trees,
@@ -133,7 +134,7 @@ impl RenderJob {
         tell_stage(watch, "looking at the light tree");
         let choice = TreeChoice {
             file: self.tree.clone(),
-            forced: self.force_lights.clone(),
+            options: build_options(&self.force_lights, &self.stage),
             verify: self.verify,
         };
         let textures = |done: u64, all: u64| {

@@ -9,8 +9,8 @@ use super::wide_bvh::{BoxRay, LEAF_SIZE, WideBvh};
 use crate::bounds::Aabb;
 use glam::Vec3;
 
-/// About as many boxes at most stand for what does not move: more would cost memory and save little.
-const MOST_BOXES: usize = 1 << 16;
+/// With more triangles than this, a box stands for a run of them: more would cost memory and save little.
+const MANY: usize = 1 << 16;
 
 /// Boxes around what shines at any time.
 #[derive(Debug, Default)]
@@ -27,7 +27,7 @@ impl Shining {
     /// Around the triangles of some meshes: one box for each, or for a run of them if there are very many.
     pub fn around_meshes(meshes: &[&[[Vec3; 3]]]) -> Shining {
         let all: usize = meshes.iter().map(|mesh| mesh.len()).sum();
-        let run = all.div_ceil(MOST_BOXES).max(1);
+        let run = all.div_ceil(MANY).max(1);
         let around = |triangles: &[[Vec3; 3]]| {
             let met = triangles.iter().filter(|triangle| can_be_hit(triangle));
             met.map(|triangle| Aabb::around(*triangle)).reduce(|a, b| a.union(&b))
