@@ -29,6 +29,8 @@ _TYPES = {
 _MAKERS = {"vector2": Gf.Vec2f, "vector3": Gf.Vec3f, "vector4": Gf.Vec4f, "color3": Gf.Vec3f, "color4": Gf.Vec4f}
 _MOST_GRAPHS = 64
 """Node graphs in node graphs."""
+_MOST_PRIMS = 20_000
+"""Prims that one document may become: graphs that hold others twice double with each level."""
 _ROOT = Sdf.Path("/MaterialX")
 
 
@@ -73,7 +75,7 @@ class Documents:
                 raise OSError("it cannot be opened")
             mx.readFromXmlString(document, data.decode("utf-8"), mx.FileSearchPath(os.path.dirname(place)))
         except Exception as error:  # noqa: BLE001 (the package raises its own types, and those of its XML reader)
-            self.problems[place] = " ".join(str(error).split()) or type(error).__name__
+            self.problems[place] = _reason(error)
             return None
         for included in document.getReferencedSourceUris():
             beside = os.path.join(os.path.dirname(place), included)
@@ -85,8 +87,19 @@ class Documents:
         layer = Sdf.Layer.CreateAnonymous(os.path.basename(place) + ".usda")
         stage = Usd.Stage.Open(layer)
         stage.SetDefaultPrim(stage.DefinePrim(_ROOT))
-        _Writer(stage, place, self.report).write(document)
+        try:
+            _Writer(stage, place, self.report).write(document)
+        except RecursionError:
+            self.problems[place] = "its node graphs are nested too deeply"
+            return None
+        except Exception as error:  # noqa: BLE001 (a document of others must not end the export)
+            self.problems[place] = _reason(error)
+            return None
         return layer
+
+
+def _reason(error: Exception) -> str:
+    return " ".join(str(error).split()) or type(error).__name__
 
 
 def _is_document(path: str) -> bool:
@@ -109,12 +122,17 @@ class _Scope:
     depth: int = 0
 
 
+class _TooLarge(Exception):
+    """The document would become too many prims."""
+
+
 class _Writer:
-    """Writes one document to a stage."""
+    """Writes one document to a stage. Raises `_TooLarge`, and whatever MaterialX and USD raise."""
 
     def __init__(self, stage: Usd.Stage, place: str, report: Notebook) -> None:
         self.stage, self.place, self.report = stage, place, report
         self._written: dict[Sdf.Path, UsdShade.ConnectableAPI] = {}
+        self._prims = 0
 
     def write(self, document) -> None:
         materials = self.stage.DefinePrim(_ROOT.AppendChild("Materials")).GetPath()
@@ -125,8 +143,14 @@ class _Writer:
             if not graph.getNodeDef():
                 self._graph(document, graph, _Scope(graphs))
 
+    def _count(self) -> None:
+        self._prims += 1
+        if self._prims > _MOST_PRIMS:
+            raise _TooLarge(f"with its node graphs written out it has more than {_MOST_PRIMS} prims")
+
     def _material(self, document, node, path: Sdf.Path) -> None:
         """A material; its shaders and node graphs are its children."""
+        self._count()
         material = UsdShade.Material.Define(self.stage, path)
         for port in node.getInputs():
             shader = port.getConnectedNode()
@@ -174,6 +198,7 @@ class _Writer:
                 )
                 return None
             return self._graph_prim(document, own, nodedef, path, scope.depth + 1)
+        self._count()
         shader = UsdShade.Shader.Define(self.stage, path)
         shader.CreateIdAttr(nodedef.getName() if nodedef else node.getCategory())
         for output in nodedef.getActiveOutputs() if nodedef else []:
@@ -183,7 +208,7 @@ class _Writer:
     def _graph(self, document, graph, scope: _Scope) -> UsdShade.ConnectableAPI:
         path = scope.path.AppendChild(_name(graph))
         if path not in self._written:
-            self._written[path] = self._graph_prim(document, graph, graph, path, scope.depth + 1)
+            self._graph_prim(document, graph, graph, path, scope.depth + 1)
             for port in graph.getInputs():
                 for source in self._input(document, graph, self._written[path], port, scope, None):
                     self._node(document, source, scope)
@@ -191,7 +216,9 @@ class _Writer:
 
     def _graph_prim(self, document, graph, interface, path: Sdf.Path, depth: int) -> UsdShade.ConnectableAPI:
         """A node graph with the inputs of its interface, and the nodes that its outputs read."""
-        prim = UsdShade.NodeGraph.Define(self.stage, path).ConnectableAPI()
+        self._count()
+        # A graph that reads itself finds itself here.
+        prim = self._written[path] = UsdShade.NodeGraph.Define(self.stage, path).ConnectableAPI()
         for port in interface.getActiveInputs() if interface is not graph else graph.getInputs():
             self._value(prim, port)
         inside = _Scope(path, prim, depth)
@@ -218,7 +245,7 @@ class _Writer:
             made = prim.CreateInput(_name(port), _type(port.getType()))
             outside = scope if not scope.depth else _Scope(_ROOT.AppendChild("NodeGraphs"))
             source = self._graph(document, graph, outside)
-            output = port.getConnectedOutput()
+            output = port.getConnectedOutput() or graph.getOutput(port.getOutputString())
             if output is not None:
                 made.ConnectToSource(source.CreateOutput(_name(output), _type(output.getType())))
             return []

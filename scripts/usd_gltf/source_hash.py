@@ -144,9 +144,9 @@ def recorded_hash(output: Path) -> str | None:
             data = data[20 : 20 + length]
         document = json.loads(data)
         uris = [item.get("uri") for kind in ("buffers", "images") for item in document.get(kind, [])]
-        uris += [
-            node.get("extras", {}).get("usdLux", {}).get("texture") for node in document.get("nodes", [])
-        ]
+        for node in document.get("nodes", []):
+            light = node.get("extras", {}).get("usdLux", {})
+            uris += [light.get("texture"), light.get("shaping", {}).get("ies", {}).get("file")]
         if all((output.parent / uri).is_file() for uri in uris if uri):
             return document["asset"]["extras"]["usd"]["sourceHash"]
     except (OSError, ValueError, KeyError, TypeError, AttributeError, struct.error):

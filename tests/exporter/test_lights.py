@@ -284,6 +284,22 @@ def test_an_ies_profile_is_carried_as_a_file_beside(export, tmp_path, out):
     assert result.warned() == {"shaping of a DistantLight"} and "shaping" not in scene.lux("/Sun")
 
 
+def test_a_profile_that_is_gone_is_written_again(export, tmp_path):
+    from conftest import Gltf
+
+    (tmp_path / "in").mkdir()
+    (tmp_path / "in" / "lamp.ies").write_text(IES)
+    text = """def SphereLight "L" (prepend apiSchemas = ["ShapingAPI"]) {
+        asset inputs:shaping:ies:file = @in/lamp.ies@
+    }"""
+    first = export(text, out="out/scene.glb")
+    assert "up to date" in export(text, out="out/scene.glb").out
+    carried = first.path.parent / Gltf(first.path).lux("/L")["shaping"]["ies"]["file"]
+    carried.unlink()
+    assert "up to date" not in export(text, out="out/scene.glb").out
+    assert carried.read_text() == IES
+
+
 def test_a_profile_keeps_that_of_the_first_frame(export, tmp_path):
     from conftest import Gltf
 

@@ -5,6 +5,7 @@ import pytest
 from conftest import Gltf
 from pxr import Sdf
 from test_materials import QUAD, picture, pixels
+from usd_gltf import materialx_layers
 
 STAGE = QUAD.replace("</Mat>", "</Looks/gold>") + 'def "Looks" (references = @looks/a.mtlx@</MaterialX/Materials>) {}\n'
 GOLD = """<?xml version="1.0"?>
@@ -218,3 +219,44 @@ def test_definitions_that_read_themselves_end(export, tmp_path):
     result = export(STAGE)
     assert result.code == 0, result.err
     assert "nested too deeply" in result.said()
+
+
+def definition(name: str, *inside: str) -> str:
+    """A definition whose graph adds nodes of other definitions, and is one of them."""
+    held = "".join(f'<{kind} name="h{at}" type="color3" />' for at, kind in enumerate(inside))
+    reads = "".join(f'<input name="in{at + 1}" type="color3" nodename="h{at}" />' for at in range(len(inside)))
+    return f"""<nodedef name="ND_{name}" node="{name}"><output name="out" type="color3" /></nodedef>
+    <nodegraph name="NG_{name}" nodedef="ND_{name}">{held}
+      <add name="sum" type="color3">{reads}</add><output name="out" type="color3" nodename="sum" />
+    </nodegraph>"""
+
+
+@pytest.mark.parametrize(
+    "definitions",
+    [
+        [definition(f"k{at}", f"k{at + 1}", f"k{at + 1}") for at in range(23)] + [definition("k23")],
+        [definition("k0", "k0", "k0")],
+        [definition("k0", "k1", "k1"), definition("k1", "k0", "k0")],
+    ],
+    ids=["doubling", "itself twice", "each other twice"],
+)
+def test_graphs_that_grow_without_bound_are_left_out(export, tmp_path, definitions, monkeypatch):
+    if len(definitions) < 3:
+        monkeypatch.setattr(materialx_layers, "_MOST_PRIMS", 2_000)
+    before = "".join(definitions) + '<k0 name="K" type="color3" />'
+    document(tmp_path, '<input name="base_color" type="color3" nodename="K" />', before)
+    result = export(STAGE)
+    assert result.code == 0, result.err
+    assert f"more than {materialx_layers._MOST_PRIMS} prims" in result.said()
+    assert result.warned("materials") >= {"unreadable layer", "material binding to nothing"}
+
+
+def test_a_node_graph_that_reads_itself_ends(export, tmp_path):
+    before = """<nodegraph name="NG">
+      <add name="a" type="color3"><input name="in1" type="color3" nodegraph="NG" output="out" /></add>
+      <output name="out" type="color3" nodename="a" />
+    </nodegraph>"""
+    document(tmp_path, '<input name="base_color" type="color3" nodegraph="NG" output="out" />', before)
+    result = export(QUAD.replace("</Mat>", "</X/Materials/gold>") + 'def "X" (references = @looks/a.mtlx@) {}')
+    assert result.code == 0, result.err
+    assert "itself" in result.said()
