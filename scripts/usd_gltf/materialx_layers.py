@@ -31,6 +31,8 @@ _MOST_GRAPHS = 64
 """Node graphs in node graphs."""
 _MOST_PRIMS = 20_000
 """Prims that one document may become: graphs that hold others twice double with each level."""
+_MOST_INCLUDES = 64
+"""Documents that include each other in a row."""
 _ROOT = Sdf.Path("/MaterialX")
 
 
@@ -67,20 +69,12 @@ class Documents:
 
     def _layer(self, place: str) -> Sdf.Layer | None:
         """The layer of a document; None if it cannot be read."""
-        mx = materialx()
-        data = self.dependencies.read(place)
-        document = mx.createDocument()
         try:
-            if data is None:
-                raise OSError("it cannot be opened")
-            mx.readFromXmlString(document, data.decode("utf-8"), mx.FileSearchPath(os.path.dirname(place)))
+            document = materialx().createDocument()
+            self._read(document, place, set())
         except Exception as error:  # noqa: BLE001 (the package raises its own types, and those of its XML reader)
             self.problems[place] = _reason(error)
             return None
-        for included in document.getReferencedSourceUris():
-            beside = os.path.join(os.path.dirname(place), included)
-            if os.path.isfile(beside):
-                self.dependencies.read(beside)
         # Nodes of the document are looked up in the library, and in its own definitions.
         document.setDataLibrary(library())
         # USD opens it by the suffix of its name.
@@ -96,6 +90,27 @@ class Documents:
             self.problems[place] = _reason(error)
             return None
         return layer
+
+
+    def _read(self, document, place: str, known: set[str], depth: int = 0) -> None:
+        """Fill a MaterialX document with a file and all that it includes, each found beside the file that names it and
+        read once: `known` are those read so far. Raises OSError, and what MaterialX raises."""
+        if depth > _MOST_INCLUDES:
+            raise OSError(f"more than {_MOST_INCLUDES} documents include each other in a row")
+        mx = materialx()
+        data = self.dependencies.read(place)
+        if data is None:
+            raise OSError(f"{place}, which it includes, cannot be opened" if depth else "it cannot be opened")
+        known.add(place)
+
+        def include(inner, name, _search_path, _options) -> None:
+            beside = _beside(place, name.asString())
+            if beside not in known:
+                self._read(inner, beside, known, depth + 1)
+
+        options = mx.XmlReadOptions()
+        options.readXIncludeFunction = include
+        mx.readFromXmlString(document, data.decode("utf-8"), mx.FileSearchPath(), options)
 
 
 def _reason(error: Exception) -> str:

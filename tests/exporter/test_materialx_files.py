@@ -149,13 +149,70 @@ def test_node_graphs_and_own_definitions(gltf, tmp_path):
     assert base(gltf(STAGE)) == pytest.approx(np.array([0.8, 0.4, 0.2]) / 8)
 
 
-def test_documents_include_others(gltf, tmp_path):
-    (tmp_path / "looks").mkdir()
-    (tmp_path / "looks" / "b.mtlx").write_text(GOLD.format(inputs=COLOR, before="", attributes=""))
-    (tmp_path / "looks" / "a.mtlx").write_text(
-        '<?xml version="1.0"?><materialx version="1.38" xmlns:xi="http://www.w3.org/2001/XInclude"><xi:include href="b.mtlx" /></materialx>'
-    )
-    assert base(gltf(STAGE)) == pytest.approx([0.1, 0.2, 0.3])
+def including(*names: str, own: str = "") -> str:
+    held = "".join(f'<xi:include href="{name}" />' for name in names)
+    return f'<materialx version="1.38" xmlns:xi="http://www.w3.org/2001/XInclude">{held}{own}</materialx>'
+
+
+def write(folder, files: dict[str, str]) -> None:
+    for name, text in files.items():
+        path = folder / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text)
+
+
+OWN_GOLD = GOLD.format(inputs=COLOR, before="", attributes="")
+
+
+@pytest.mark.parametrize(
+    "files",
+    [
+        {"a.mtlx": including("b.mtlx"), "b.mtlx": OWN_GOLD},
+        {"a.mtlx": including("x/b.mtlx"), "x/b.mtlx": including("y/c.mtlx"), "x/y/c.mtlx": including("../d.mtlx"), "x/d.mtlx": OWN_GOLD},
+        # A file of the same name beside the outermost one is not meant.
+        {"a.mtlx": including("x/b.mtlx"), "x/b.mtlx": including("c.mtlx"), "x/c.mtlx": OWN_GOLD, "c.mtlx": including()},
+        {"a.mtlx": including("b.mtlx", "c.mtlx"), "b.mtlx": including("c.mtlx"), "c.mtlx": OWN_GOLD},
+    ],
+    ids=["beside", "nested", "same name", "twice"],
+)  # fmt: skip
+def test_documents_include_others(export, tmp_path, files):
+    write(tmp_path / "looks", files)
+    result = export(STAGE)
+    assert result.report["warnings"] == []
+    assert base(Gltf(result.path)) == pytest.approx([0.1, 0.2, 0.3])
+    read = {f"looks/{name}" for name in files if name != "c.mtlx" or "x/c.mtlx" not in files}
+    assert {name for name in result.report["dependencies"] if name.endswith(".mtlx")} == read
+
+
+def test_cycles_of_documents_end(export, tmp_path):
+    content = OWN_GOLD[OWN_GOLD.index("<standard_surface") : OWN_GOLD.index("</materialx>")]
+    files = {"a.mtlx": including("x/b.mtlx"), "x/b.mtlx": including("../a.mtlx", "b.mtlx", own=content)}
+    write(tmp_path / "looks", files)
+    result = export(STAGE)
+    assert result.report["warnings"] == []
+    assert base(Gltf(result.path)) == pytest.approx([0.1, 0.2, 0.3])
+
+
+@pytest.mark.parametrize(("length", "is_read"), [(60, True), (3_000, False)])
+def test_long_chains_of_documents(export, tmp_path, length, is_read):
+    write(tmp_path / "looks", {f"{at}.mtlx": including(f"{at + 1}.mtlx") for at in range(length)})
+    write(tmp_path / "looks", {"a.mtlx": including("0.mtlx"), f"{length}.mtlx": OWN_GOLD})
+    result = export(STAGE)
+    assert result.code == 0, result.err
+    assert ("unreadable layer" in result.warned("materials")) is not is_read
+
+
+def test_included_documents_that_are_missing_are_dependencies(export, tmp_path):
+    write(tmp_path / "looks", {"a.mtlx": including("x/b.mtlx"), "x/b.mtlx": including("c.mtlx")})
+    result = export(STAGE)
+    assert result.code == 0, result.err
+    assert "unreadable layer" in result.warned("materials") and "c.mtlx" in result.said()
+    assert result.report["dependencies"]["looks/x/c.mtlx"] == "missing"
+    assert "up to date" in export(STAGE).out
+    write(tmp_path / "looks", {"x/c.mtlx": OWN_GOLD})
+    result = export(STAGE)
+    assert result.report["warnings"] == []
+    assert base(Gltf(result.path)) == pytest.approx([0.1, 0.2, 0.3])
 
 
 def test_packages(gltf, tmp_path):
