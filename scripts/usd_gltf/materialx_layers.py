@@ -26,7 +26,10 @@ _TYPES = {
     "matrix44": "Matrix4d",
 }  # fmt: skip
 """Names in `Sdf.ValueTypeNames`; any other type is a token."""
-_MAKERS = {"vector2": Gf.Vec2f, "vector3": Gf.Vec3f, "vector4": Gf.Vec4f, "color3": Gf.Vec3f, "color4": Gf.Vec4f}
+_MAKERS = {
+    "vector2": Gf.Vec2f, "vector3": Gf.Vec3f, "vector4": Gf.Vec4f, "color3": Gf.Vec3f, "color4": Gf.Vec4f,
+    "matrix33": Gf.Matrix3d, "matrix44": Gf.Matrix4d,
+}  # fmt: skip
 _MOST_GRAPHS = 64
 """Node graphs in node graphs."""
 _MOST_PRIMS = 20_000
@@ -325,11 +328,6 @@ def _value(port, place: str) -> object:
         return None
     if kind in _MAKERS:
         return _MAKERS[kind](*value)
-    if kind in ("matrix33", "matrix44"):
-        size = 3 if kind == "matrix33" else 4
-        if len(value) != size * size:
-            return None
-        return (Gf.Matrix3d if size == 3 else Gf.Matrix4d)(*value)
     return {"integer": int, "boolean": bool}.get(kind, lambda v: v)(value)
 
 

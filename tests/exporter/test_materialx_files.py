@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from conftest import Gltf
+from networks import link, network, node
 from pxr import Sdf
 from test_materials import QUAD, picture, pixels
 from usd_gltf import materialx_layers
@@ -317,3 +318,44 @@ def test_a_node_graph_that_reads_itself_ends(export, tmp_path):
     result = export(QUAD.replace("</Mat>", "</X/Materials/gold>") + 'def "X" (references = @looks/a.mtlx@) {}')
     assert result.code == 0, result.err
     assert "itself" in result.said()
+
+
+NUMBERS = ["nan", "inf", "-inf", "1e999", "1e300", "99999999999", "-2147483649", "2147483648", "", "x", "1, 2", "0x10"]
+
+
+@pytest.mark.parametrize("text", NUMBERS)
+@pytest.mark.parametrize("kind", ["integer", "float", "color3", "vector2", "boolean", "matrix33", "matrix44"])
+def test_a_bad_number_is_the_loss_of_its_input(export, tmp_path, kind, text):
+    """Also as the index that an element of a colour is chosen by."""
+    value = text if kind in ("integer", "float", "boolean") else ", ".join([text] * 3)
+    before = f'''<constant name="C" type="{kind}"><input name="value" type="{kind}" value="{value}" /></constant>
+      <extract name="E" type="float"><input name="in" type="color3" value="0.5, 0.25, 0.125" />
+        <input name="index" type="{kind}" value="{value}" /></extract>
+      <extract name="F" type="float"><input name="in" type="color3" value="0.5, 0.25, 0.125" />
+        <input name="index" type="{kind}" nodename="C" /></extract>'''
+    reads = '<input name="metalness" type="float" nodename="E" /><input name="coat" type="float" nodename="F" />'
+    document(tmp_path, COLOR + reads + '<input name="coat_roughness" type="float" nodename="C" />', before)
+    result = export(STAGE)
+    assert result.code == 0, result.err
+    assert base(Gltf(result.path)) == pytest.approx([0.1, 0.2, 0.3])
+
+
+@pytest.mark.parametrize("index", ["inf", "-inf", "nan", "1e30"])
+def test_an_index_that_is_not_finite(export, index):
+    element = node("E", "ND_extract_color3", f"color3f inputs:in = (0.5, 0.25, 0.125)\n float inputs:index = {index}", "float outputs:out")
+    result = export(network("color3f inputs:base_color = (0.1, 0.2, 0.3)\n" + link("metalness", "E", "float"), element))
+    assert result.code == 0, result.err
+    assert base(Gltf(result.path)) == pytest.approx([0.1, 0.2, 0.3])
+    assert result.warned() == (set() if index == "1e30" else {"standard_surface metalness"})
+
+
+def test_what_goes_wrong_in_a_document_is_its_problem_alone(export, tmp_path, monkeypatch):
+    def fail(*_):
+        raise ZeroDivisionError("an error inside")
+
+    document(tmp_path)
+    monkeypatch.setattr(materialx_layers, "_value", fail)
+    result = export(STAGE)
+    assert result.code == 0, result.err
+    assert "an error inside" in result.said()
+    assert "unreadable layer" in result.warned("materials")
