@@ -9,7 +9,7 @@ import functools
 import re
 from dataclasses import dataclass, field
 
-from .report import ExportError
+from .quantities import Lost
 
 _ALIASES = {
     "UsdUVTexture": "ND_UsdUVTexture_23", "ND_UsdUVTexture": "ND_UsdUVTexture_23", "UsdTransform2d": "ND_UsdTransform2d",
@@ -50,12 +50,12 @@ class Definition:
 
 
 def materialx():
-    """The package MaterialX."""
+    """The package MaterialX. Raises `Lost` where it is not installed: only what needs it is left out."""
     try:
         import MaterialX
     except ImportError as error:
         remedy = "install it with `pip install -r scripts/requirements.txt`"
-        raise ExportError(f"materials of MaterialX need the Python package materialx ({error}): {remedy}") from None
+        raise Lost(f"MaterialX needs the Python package materialx ({error}): {remedy}") from None
     return MaterialX
 
 

@@ -5,7 +5,7 @@ import contextlib
 import numpy as np
 import pytest
 from conftest import Gltf
-from networks import STANDARD, extension, link, network, node
+from networks import STANDARD, extension, network
 from pxr import Sdf, Usd, UsdShade
 from usd_gltf.evaluator import Evaluator
 from usd_gltf.network_images import NetworkImages

@@ -1,12 +1,14 @@
 """MaterialX documents that stages refer to."""
 
+import sys
+
 import numpy as np
 import pytest
 from conftest import Gltf
 from networks import link, network, node
 from pxr import Sdf
 from test_materials import QUAD, picture, pixels
-from usd_gltf import materialx_layers
+from usd_gltf import materialx_layers, materialx_library
 
 STAGE = QUAD.replace("</Mat>", "</Looks/gold>") + 'def "Looks" (references = @looks/a.mtlx@</MaterialX/Materials>) {}\n'
 GOLD = """<?xml version="1.0"?>
@@ -187,8 +189,10 @@ def test_documents_include_others(export, tmp_path, files):
 
 def test_cycles_of_documents_end(export, tmp_path):
     content = OWN_GOLD[OWN_GOLD.index("<standard_surface") : OWN_GOLD.index("</materialx>")]
-    files = {"a.mtlx": including("x/b.mtlx"), "x/b.mtlx": including("../a.mtlx", "b.mtlx", own=content)}
-    write(tmp_path / "looks", files)
+    write(
+        tmp_path / "looks",
+        {"a.mtlx": including("x/b.mtlx"), "x/b.mtlx": including("../a.mtlx", "b.mtlx", own=content)},
+    )
     result = export(STAGE)
     assert result.report["warnings"] == []
     assert base(Gltf(result.path)) == pytest.approx([0.1, 0.2, 0.3])
@@ -315,7 +319,8 @@ def test_a_node_graph_that_reads_itself_ends(export, tmp_path):
       <output name="out" type="color3" nodename="a" />
     </nodegraph>"""
     document(tmp_path, '<input name="base_color" type="color3" nodegraph="NG" output="out" />', before)
-    result = export(QUAD.replace("</Mat>", "</X/Materials/gold>") + 'def "X" (references = @looks/a.mtlx@) {}')
+    whole = 'def "X" (references = @looks/a.mtlx@) {}'
+    result = export(QUAD.replace("</Mat>", "</X/Materials/gold>") + whole)
     assert result.code == 0, result.err
     assert "itself" in result.said()
 
@@ -342,7 +347,8 @@ def test_a_bad_number_is_the_loss_of_its_input(export, tmp_path, kind, text):
 
 @pytest.mark.parametrize("index", ["inf", "-inf", "nan", "1e30"])
 def test_an_index_that_is_not_finite(export, index):
-    element = node("E", "ND_extract_color3", f"color3f inputs:in = (0.5, 0.25, 0.125)\n float inputs:index = {index}", "float outputs:out")
+    inputs = f"color3f inputs:in = (0.5, 0.25, 0.125)\n float inputs:index = {index}"
+    element = node("E", "ND_extract_color3", inputs, "float outputs:out")
     result = export(network("color3f inputs:base_color = (0.1, 0.2, 0.3)\n" + link("metalness", "E", "float"), element))
     assert result.code == 0, result.err
     assert base(Gltf(result.path)) == pytest.approx([0.1, 0.2, 0.3])
@@ -359,3 +365,43 @@ def test_what_goes_wrong_in_a_document_is_its_problem_alone(export, tmp_path, mo
     assert result.code == 0, result.err
     assert "an error inside" in result.said()
     assert "unreadable layer" in result.warned("materials")
+
+
+@pytest.fixture
+def without_materialx(monkeypatch):
+    """As if the package were not installed."""
+    monkeypatch.setitem(sys.modules, "MaterialX", None)
+    for cached in (materialx_library.library, materialx_library.definition):
+        cached.cache_clear()
+    yield
+    for cached in (materialx_library.library, materialx_library.definition):
+        cached.cache_clear()
+
+
+REMEDY = "pip install -r scripts/requirements.txt"
+LIGHT = 'def SphereLight "Light" {}\n'
+
+
+def test_documents_without_the_package_are_left_out(export, tmp_path, without_materialx):
+    document(tmp_path)
+    result = export(LIGHT + STAGE)
+    assert result.code == 0, result.err
+    assert [line["what"] for line in result.report["warnings"] if REMEDY in line["why"]] == ["unreadable layer"]
+    assert {"/Light", "/M"} <= set(Gltf(result.path).by_path)
+    assert export(LIGHT + STAGE, "--strict", out="strict.glb").code != 0
+
+
+def test_networks_without_the_package_are_left_out(export, without_materialx):
+    fallback = """def Shader "P" { uniform token info:id = "UsdPreviewSurface"
+        color3f inputs:diffuseColor = (0.1, 0.2, 0.3)
+        token outputs:surface
+    }
+    """
+    universal = "token outputs:surface.connect = </Mat/P.outputs:surface>"
+    text = LIGHT + network("color3f inputs:base_color = (1, 0, 0)", fallback, interface=universal)
+    result = export(text)
+    assert result.code == 0, result.err
+    assert [line["path"] for line in result.report["warnings"] if REMEDY in line["why"]] == ["/Mat"]
+    assert base(Gltf(result.path)) == pytest.approx([0.1, 0.2, 0.3])
+    assert "/Light" in Gltf(result.path).by_path
+    assert export(text, "--strict", out="strict.glb").code != 0

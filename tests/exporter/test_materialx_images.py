@@ -339,7 +339,7 @@ def test_reads_of_one_file_that_differ_are_kept_apart(gltf, tmp_path):
     picture(tmp_path / "a.png", 200, 100, 50)
     raw = squared(0, "a.png").replace("@a.png@", '@a.png@ (colorSpace = "raw")')
     clamped = squared(2, "a.png", 'string inputs:uaddressmode = "clamp"\n')
-    tiled = squared(3, "a.png").replace("ND_image_color3", "ND_tiledimage_color3").replace("@a.png@", "@a.png@\n float2 inputs:uvtiling = (2, 2)")
+    tiled = squared(3, "a.png", "float2 inputs:uvtiling = (2, 2)\n").replace("ND_image_color3", "ND_tiledimage_color3")
     scene = gltf(raw + squared(1, "a.png") + clamped + tiled)
     infos = [scene.material(f"/M{index}")["pbrMetallicRoughness"]["baseColorTexture"] for index in range(4)]
     codes = [float(linear(pixels(scene, info)[0, 0, 0] / 255)) for info in infos]
