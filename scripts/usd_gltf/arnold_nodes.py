@@ -1,7 +1,7 @@
 """What Arnold's shaders compute (Arnold's user guide, "Shaders"), as functions of quantities, beside `shader_nodes`.
 
 Only those whose formula is published; a network brings no defaults, so they stand here. What Arnold adds to an image
-is read by `network_values`.
+is read by `evaluator`.
 """
 
 from __future__ import annotations
@@ -102,10 +102,7 @@ def _layers(call: Call) -> Quantity:
 
 def _checkerboard(call: Call) -> Quantity:
     """Two by two squares on each repetition."""
-    if call.text("uvset"):
-        surface = uv(call.text("uvset"))
-    else:
-        surface = uv("st")
+    surface = uv(call.text("uvset") or "st")
     scale = Quantity.of((number(call, "u_frequency", 1.0), number(call, "v_frequency", 1.0)))
     shift = Quantity.of((number(call, "u_offset"), number(call, "v_offset")))
     at = call.canvas.multiply(add(surface, shift), scale)

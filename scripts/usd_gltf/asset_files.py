@@ -47,7 +47,7 @@ class AssetFiles:
         resolved = asset.resolvedPath
         data = self.dependencies.read(resolved) if resolved else None
         if data is None:
-            place = resolved or _anchored(attribute, code, asset.path)
+            place = place_of(attribute, code)
             self.dependencies.miss(place)
             found = f"{asset.path} is a folder" if os.path.isdir(place) else f"{asset.path} cannot be found"
             if os.path.isfile(place):
@@ -69,6 +69,14 @@ class AssetFiles:
             else:
                 self.dependencies.miss(place)
         return found
+
+
+def place_of(attribute: Usd.Attribute, code: float) -> str:
+    """Where the file is that an attribute names, or where it should be; empty if it names none."""
+    asset = attribute.Get(code)
+    if not isinstance(asset, Sdf.AssetPath) or not asset.path:
+        return ""
+    return asset.resolvedPath or _anchored(attribute, code, asset.path)
 
 
 def _file(resolved: str, data: bytes) -> AssetFile:

@@ -88,7 +88,7 @@ class Evaluator:
                 raise Lost("this node is not read" if node.kind else "nobody knows this node")
         except Lost as lost:
             raise lost.placed(_named(node)) from None
-        except (IndexError, ValueError, TypeError):
+        except (IndexError, ValueError, TypeError, ArithmeticError):
             raise Lost("its inputs do not fit together").placed(_named(node)) from None
         return arnold_nodes.part(value, link.output) if node.kind.startswith("arnold:") else value
 

@@ -10,7 +10,7 @@ import os
 
 from pxr import Usd
 
-from .asset_files import AssetFiles
+from .asset_files import AssetFiles, place_of
 from .gltf_document import Document, number
 from .light_inputs import Light
 from .report import Notebook
@@ -27,29 +27,34 @@ class LightProfiles:
     def __init__(self, document: Document, dependencies: Dependencies, frames: Frames, report: Notebook) -> None:
         self.document, self.frames, self.report = document, frames, report
         self.files = AssetFiles(dependencies)
-        self._carried: dict[str, dict | None] = {}
+        self._carried: dict[str, str] = {}
+        """The file beside the glTF by where the profile is."""
 
     def carry(self, light: Light) -> dict | None:
         """`extras.usdLux.shaping.ies` of a light; None if it has no profile, or (reported) none that can be read."""
         if light.profile is None:
             return None
-        if light.path not in self._carried:
-            self._carried[light.path] = self._read(light, light.profile.file)
-        return self._carried[light.path]
-
-    def _read(self, light: Light, attribute: Usd.Attribute) -> dict | None:
-        instead = "the light shines without it, as bright as if every number in it were 1"
-        file = self.files.read(light.path, attribute, self.frames.first, instead, self.report, "IES profile")
-        if file is None:
+        uri = self._uri(light, light.profile.file)
+        if uri is None:
             return None
-        stem, suffix = os.path.splitext(file.name)
-        fitting = suffix.lower() == ".ies"
-        uri = self.document.side_file(
-            file.name if fitting else f"{stem}.ies", file.data, file.existing if fitting else None
-        )
         ies: dict = {"file": uri}
         if light.profile.angle_scale != 0.0:
             ies["angleScale"] = number(light.profile.angle_scale)
         if light.profile.normalize:
             ies["normalize"] = True
         return ies
+
+    def _uri(self, light: Light, attribute: Usd.Attribute) -> str | None:
+        """The file beside the glTF."""
+        place = place_of(attribute, self.frames.first)
+        if place not in self._carried:
+            instead = "the light shines without it, as bright as if every number in it were 1"
+            file = self.files.read(light.path, attribute, self.frames.first, instead, self.report, "IES profile")
+            if file is None:  # reported for each light
+                return None
+            stem, suffix = os.path.splitext(file.name)
+            fitting = suffix.lower() == ".ies"
+            self._carried[place] = self.document.side_file(
+                file.name if fitting else f"{stem}.ies", file.data, file.existing if fitting else None
+            )
+        return self._carried[place]

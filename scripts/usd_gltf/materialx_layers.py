@@ -26,9 +26,16 @@ _TYPES = {
     "matrix44": "Matrix4d",
 }  # fmt: skip
 """Names in `Sdf.ValueTypeNames`; any other type is a token."""
-_MAKERS = {"vector2": Gf.Vec2f, "vector3": Gf.Vec3f, "vector4": Gf.Vec4f, "color3": Gf.Vec3f, "color4": Gf.Vec4f}
+_MAKERS = {
+    "vector2": Gf.Vec2f, "vector3": Gf.Vec3f, "vector4": Gf.Vec4f, "color3": Gf.Vec3f, "color4": Gf.Vec4f,
+    "matrix33": Gf.Matrix3d, "matrix44": Gf.Matrix4d,
+}  # fmt: skip
 _MOST_GRAPHS = 64
 """Node graphs in node graphs."""
+_MOST_PRIMS = 20_000
+"""Prims that one document may become: graphs that hold others twice double with each level."""
+_MOST_INCLUDES = 64
+"""Documents that include each other in a row."""
 _ROOT = Sdf.Path("/MaterialX")
 
 
@@ -65,28 +72,52 @@ class Documents:
 
     def _layer(self, place: str) -> Sdf.Layer | None:
         """The layer of a document; None if it cannot be read."""
-        mx = materialx()
-        data = self.dependencies.read(place)
-        document = mx.createDocument()
         try:
-            if data is None:
-                raise OSError("it cannot be opened")
-            mx.readFromXmlString(document, data.decode("utf-8"), mx.FileSearchPath(os.path.dirname(place)))
+            document = materialx().createDocument()
+            self._read(document, place, set())
         except Exception as error:  # noqa: BLE001 (the package raises its own types, and those of its XML reader)
-            self.problems[place] = " ".join(str(error).split()) or type(error).__name__
+            self.problems[place] = _reason(error)
             return None
-        for included in document.getReferencedSourceUris():
-            beside = os.path.join(os.path.dirname(place), included)
-            if os.path.isfile(beside):
-                self.dependencies.read(beside)
         # Nodes of the document are looked up in the library, and in its own definitions.
         document.setDataLibrary(library())
         # USD opens it by the suffix of its name.
         layer = Sdf.Layer.CreateAnonymous(os.path.basename(place) + ".usda")
         stage = Usd.Stage.Open(layer)
         stage.SetDefaultPrim(stage.DefinePrim(_ROOT))
-        _Writer(stage, place, self.report).write(document)
+        try:
+            _Writer(stage, place, self.report).write(document)
+        except RecursionError:
+            self.problems[place] = "its node graphs are nested too deeply"
+            return None
+        except Exception as error:  # noqa: BLE001 (a document of others must not end the export)
+            self.problems[place] = _reason(error)
+            return None
         return layer
+
+
+    def _read(self, document, place: str, known: set[str], depth: int = 0) -> None:
+        """Fill a MaterialX document with a file and all that it includes, each found beside the file that names it and
+        read once: `known` are those read so far. Raises OSError, and what MaterialX raises."""
+        if depth > _MOST_INCLUDES:
+            raise OSError(f"more than {_MOST_INCLUDES} documents include each other in a row")
+        mx = materialx()
+        data = self.dependencies.read(place)
+        if data is None:
+            raise OSError(f"{place}, which it includes, cannot be opened" if depth else "it cannot be opened")
+        known.add(place)
+
+        def include(inner, name, _search_path, _options) -> None:
+            beside = _beside(place, name.asString())
+            if beside not in known:
+                self._read(inner, beside, known, depth + 1)
+
+        options = mx.XmlReadOptions()
+        options.readXIncludeFunction = include
+        mx.readFromXmlString(document, data.decode("utf-8"), mx.FileSearchPath(), options)
+
+
+def _reason(error: Exception) -> str:
+    return " ".join(str(error).split()) or type(error).__name__
 
 
 def _is_document(path: str) -> bool:
@@ -109,12 +140,17 @@ class _Scope:
     depth: int = 0
 
 
+class _TooLarge(Exception):
+    """The document would become too many prims."""
+
+
 class _Writer:
-    """Writes one document to a stage."""
+    """Writes one document to a stage. Raises `_TooLarge`, and whatever MaterialX and USD raise."""
 
     def __init__(self, stage: Usd.Stage, place: str, report: Notebook) -> None:
         self.stage, self.place, self.report = stage, place, report
         self._written: dict[Sdf.Path, UsdShade.ConnectableAPI] = {}
+        self._prims = 0
 
     def write(self, document) -> None:
         materials = self.stage.DefinePrim(_ROOT.AppendChild("Materials")).GetPath()
@@ -125,8 +161,14 @@ class _Writer:
             if not graph.getNodeDef():
                 self._graph(document, graph, _Scope(graphs))
 
+    def _count(self) -> None:
+        self._prims += 1
+        if self._prims > _MOST_PRIMS:
+            raise _TooLarge(f"with its node graphs written out it has more than {_MOST_PRIMS} prims")
+
     def _material(self, document, node, path: Sdf.Path) -> None:
         """A material; its shaders and node graphs are its children."""
+        self._count()
         material = UsdShade.Material.Define(self.stage, path)
         for port in node.getInputs():
             shader = port.getConnectedNode()
@@ -174,6 +216,7 @@ class _Writer:
                 )
                 return None
             return self._graph_prim(document, own, nodedef, path, scope.depth + 1)
+        self._count()
         shader = UsdShade.Shader.Define(self.stage, path)
         shader.CreateIdAttr(nodedef.getName() if nodedef else node.getCategory())
         for output in nodedef.getActiveOutputs() if nodedef else []:
@@ -183,7 +226,7 @@ class _Writer:
     def _graph(self, document, graph, scope: _Scope) -> UsdShade.ConnectableAPI:
         path = scope.path.AppendChild(_name(graph))
         if path not in self._written:
-            self._written[path] = self._graph_prim(document, graph, graph, path, scope.depth + 1)
+            self._graph_prim(document, graph, graph, path, scope.depth + 1)
             for port in graph.getInputs():
                 for source in self._input(document, graph, self._written[path], port, scope, None):
                     self._node(document, source, scope)
@@ -191,7 +234,9 @@ class _Writer:
 
     def _graph_prim(self, document, graph, interface, path: Sdf.Path, depth: int) -> UsdShade.ConnectableAPI:
         """A node graph with the inputs of its interface, and the nodes that its outputs read."""
-        prim = UsdShade.NodeGraph.Define(self.stage, path).ConnectableAPI()
+        self._count()
+        # A graph that reads itself finds itself here.
+        prim = self._written[path] = UsdShade.NodeGraph.Define(self.stage, path).ConnectableAPI()
         for port in interface.getActiveInputs() if interface is not graph else graph.getInputs():
             self._value(prim, port)
         inside = _Scope(path, prim, depth)
@@ -218,7 +263,7 @@ class _Writer:
             made = prim.CreateInput(_name(port), _type(port.getType()))
             outside = scope if not scope.depth else _Scope(_ROOT.AppendChild("NodeGraphs"))
             source = self._graph(document, graph, outside)
-            output = port.getConnectedOutput()
+            output = port.getConnectedOutput() or graph.getOutput(port.getOutputString())
             if output is not None:
                 made.ConnectToSource(source.CreateOutput(_name(output), _type(output.getType())))
             return []
@@ -283,11 +328,6 @@ def _value(port, place: str) -> object:
         return None
     if kind in _MAKERS:
         return _MAKERS[kind](*value)
-    if kind in ("matrix33", "matrix44"):
-        size = 3 if kind == "matrix33" else 4
-        if len(value) != size * size:
-            return None
-        return (Gf.Matrix3d if size == 3 else Gf.Matrix4d)(*value)
     return {"integer": int, "boolean": bool}.get(kind, lambda v: v)(value)
 
 

@@ -9,7 +9,7 @@ import functools
 import re
 from dataclasses import dataclass, field
 
-from .report import ExportError
+from .quantities import Lost
 
 _ALIASES = {
     "UsdUVTexture": "ND_UsdUVTexture_23", "ND_UsdUVTexture": "ND_UsdUVTexture_23", "UsdTransform2d": "ND_UsdTransform2d",
@@ -21,6 +21,7 @@ WIDTHS = {
     "float": 1, "integer": 1, "boolean": 1, "vector2": 2, "color3": 3, "vector3": 3, "color4": 4, "vector4": 4,
 }  # fmt: skip
 """Parts of each type that is a number."""
+_SIZES = {**WIDTHS, "matrix33": 9, "matrix44": 16}
 
 
 @dataclass
@@ -49,12 +50,12 @@ class Definition:
 
 
 def materialx():
-    """The package MaterialX."""
+    """The package MaterialX. Raises `Lost` where it is not installed: only what needs it is left out."""
     try:
         import MaterialX
     except ImportError as error:
         remedy = "install it with `pip install -r scripts/requirements.txt`"
-        raise ExportError(f"materials of MaterialX need the Python package materialx ({error}): {remedy}") from None
+        raise Lost(f"MaterialX needs the Python package materialx ({error}): {remedy}") from None
     return MaterialX
 
 
@@ -95,17 +96,20 @@ def described_port(port) -> Port:
 
 
 def parsed(type_name: str, text: str | None) -> object:
-    """A value of a MaterialX document: a number, a tuple of numbers or a string; None if it is none."""
+    """A value of a MaterialX document: a number, a tuple of numbers or a string; None if it is none. An integer is one of
+    32 bits."""
     if text is None:
         return None
     if type_name == "boolean":
         return float(text.strip() == "true")
-    if type_name in WIDTHS or type_name in ("matrix33", "matrix44"):
+    if type_name in _SIZES:
         try:
             values = tuple(float(word) for word in text.split(","))
         except ValueError:
             return None
-        if type_name in WIDTHS and len(values) != WIDTHS[type_name]:
+        if len(values) != _SIZES[type_name]:
+            return None
+        if type_name == "integer" and not -(2**31) <= values[0] < 2**31:  # also what is not a number
             return None
         return values if len(values) > 1 else values[0]
     return text

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import math
+from collections import OrderedDict
 from dataclasses import replace
+from weakref import WeakValueDictionary
 
 import numpy as np
 from pxr import Usd
 
 from . import pictures
+from .asset_files import place_of
 from .color_spaces import is_known, texture_space, to_rec709
 from .pictures import linear_from_srgb
 from .quantities import Channel, Coordinate, Lost, Part, Picture, Quantity
@@ -20,16 +23,21 @@ _WRAPS = {
     "useMetadata": "repeat", "file": "repeat",
 }  # fmt: skip
 """UsdUVTexture's wrap modes by MaterialX's and Arnold's."""
+_MOST_BYTES = 1 << 28
+"""Bytes of files and texels that are kept: those of one picture of 4096 x 4096 pixels."""
 _STRAIGHT = 1e-5
 """How far, relative to their scale, the axes of texture coordinates may be from square ones."""
 
 
 class NetworkImages:
-    """Reads each image of a stage's networks once."""
+    """Reads the images of a stage's networks: each once while it is in use, and while its bytes are among the last
+    `_MOST_BYTES`."""
 
     def __init__(self, textures: Textures) -> None:
         self.textures = textures
-        self._known: dict[tuple, Picture | None] = {}
+        self.kept = Kept(_MOST_BYTES)
+        self._used: WeakValueDictionary[tuple, Picture] = WeakValueDictionary()
+        self._lost: set[tuple] = set()
 
     def read(
         self,
@@ -43,13 +51,6 @@ class NetworkImages:
     ) -> Picture | None:
         """The image that an attribute names; None (reported) if it cannot be read. `space` is a colour space, `mapping` the
         primvar and the transform of `straight`."""
-        uv_name, transform = mapping
-        key = (attribute.GetPath(), code, space, uv_name, transform, wraps)
-        if key not in self._known:
-            self._known[key] = self._read(owner, attribute, code, space, mapping, wraps, report)
-        return self._known[key]
-
-    def _read(self, owner, attribute, code, space, mapping, wraps, report) -> Picture | None:
         named = texture_space(space)
         if named is None and not is_known(space):
             report.warn(
@@ -63,27 +64,74 @@ class NetworkImages:
             color_space=named or "raw", wraps=tuple(_WRAPS.get(wrap, "repeat") for wrap in wraps),
             uv_name=mapping[0], transform=mapping[1],
         )  # fmt: skip
+        place = place_of(attribute, self.textures.code)
+        key = (place, named or space, plan.uv_name, plan.transform, plan.wraps)
+        # What is wrong with a file is reported for every material that reads it.
+        asked = (owner, attribute.GetPath(), *key)
+        if asked in self._lost:
+            return None
+        picture = self._used.get(key)
+        if picture is None:
+            read = self._read(owner, attribute, plan, "" if named else space, report)
+            if read is None:
+                self._lost.add(asked)
+                return None
+            picture = self._used[key] = self._picture(read, place)
+        decoded = picture.read.picture
+        self.kept.put(key, picture, len(picture.read.data) + (decoded.texels.nbytes if decoded is not None else 0))
+        return picture
+
+    def _read(
+        self, owner: str, attribute: Usd.Attribute, plan: TextureRead, space: str, report: Notebook
+    ) -> TextureRead | None:
+        """The file as `plan` says, converted from `space` if that is not empty."""
         read = self.textures.read(owner, attribute, plan, report)
         if read is None:
             return None
         if read.color_space == "auto":  # files of light, and of one channel, are raw by now
             read = replace(read, color_space="raw" if read.picture is not None and read.picture.linear else "sRGB")
-        if named is None:
-            read = _converted(read, space)
-        return _picture(read)
+        return _converted(read, space) if space else read
+
+    def _picture(self, read: TextureRead, place: str) -> Picture:
+        def values(index: int) -> np.ndarray:
+            decoded = read.picture or self._decoded(read.data, place)
+            plane = decoded.texels[:, :, index]
+            coded = read.color_space == "sRGB" and index < 3 and not decoded.linear
+            return linear_from_srgb(plane) if coded else plane
+
+        return Picture(read, values)
+
+    def _decoded(self, data: bytes, place: str) -> pictures.Picture:
+        key = (place,)
+        picture = self.kept.get(key)
+        if picture is None:
+            picture = pictures.decode(data)
+            self.kept.put(key, picture, picture.texels.nbytes)
+        return picture
 
 
-def _picture(read: TextureRead) -> Picture:
-    decoded: list[pictures.Picture] = []
+class Kept:
+    """The things that were used last, as many as fit in `limit` bytes, and at least one."""
 
-    def values(index: int) -> np.ndarray:
-        if not decoded:
-            decoded.append(read.picture or pictures.decode(read.data))
-        plane = decoded[0].texels[:, :, index]
-        coded = read.color_space == "sRGB" and index < 3 and not decoded[0].linear
-        return linear_from_srgb(plane) if coded else plane
+    def __init__(self, limit: int) -> None:
+        self.limit, self.bytes = limit, 0
+        self._items: OrderedDict[tuple, tuple[object, int]] = OrderedDict()
 
-    return Picture(read, values)
+    def get(self, key: tuple) -> object | None:
+        """The thing, which is the last used now; None if it is not kept."""
+        if key not in self._items:
+            return None
+        self._items.move_to_end(key)
+        return self._items[key][0]
+
+    def put(self, key: tuple, item: object, size: int) -> None:
+        """Keep a thing of `size` bytes as the last used one."""
+        _, before = self._items.pop(key, (None, 0))
+        self._items[key] = item, size
+        self.bytes += size - before
+        while self.bytes > self.limit and len(self._items) > 1:
+            _, (_, gone) = self._items.popitem(last=False)
+            self.bytes -= gone
 
 
 def _converted(read: TextureRead, space: str) -> TextureRead:

@@ -14,6 +14,7 @@ import json
 import os
 import struct
 import time
+from importlib import metadata
 from pathlib import Path
 
 from pxr import Ar, Sdf, Usd
@@ -118,7 +119,7 @@ def _digest(data: bytes) -> str:
 
 
 def _fingerprint(options: Options, files: dict[str, str]) -> str:
-    """Exporter, options, environment and files in one number."""
+    """Exporter, packages, options, environment and files in one number."""
     digest = hashlib.blake2b(digest_size=20)
 
     def add(label: str, data: bytes) -> None:
@@ -127,12 +128,21 @@ def _fingerprint(options: Options, files: dict[str, str]) -> str:
     add("exporter", f"{EXPORTER} {Usd.GetVersion()}".encode())
     for module in sorted(Path(__file__).parent.glob("*.py")):
         add(module.name, module.read_bytes())
+    add("materialx", _version("materialx").encode())
     add("options", repr(options).encode())
     for variable in _ENVIRONMENT:
         add(variable, os.environ.get(variable, "").encode("utf-8", "replace"))
     for name, content in sorted(files.items()):
         add(name, content.encode())
     return digest.hexdigest()
+
+
+def _version(package: str) -> str:
+    """The version of a Python package; empty if it is not installed, since what it reads is left out then."""
+    try:
+        return metadata.version(package)
+    except metadata.PackageNotFoundError:
+        return ""
 
 
 def recorded_hash(output: Path) -> str | None:
@@ -144,9 +154,9 @@ def recorded_hash(output: Path) -> str | None:
             data = data[20 : 20 + length]
         document = json.loads(data)
         uris = [item.get("uri") for kind in ("buffers", "images") for item in document.get(kind, [])]
-        uris += [
-            node.get("extras", {}).get("usdLux", {}).get("texture") for node in document.get("nodes", [])
-        ]
+        for node in document.get("nodes", []):
+            light = node.get("extras", {}).get("usdLux", {})
+            uris += [light.get("texture"), light.get("shaping", {}).get("ies", {}).get("file")]
         if all((output.parent / uri).is_file() for uri in uris if uri):
             return document["asset"]["extras"]["usd"]["sourceHash"]
     except (OSError, ValueError, KeyError, TypeError, AttributeError, struct.error):

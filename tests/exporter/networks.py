@@ -1,5 +1,6 @@
 """Stages with one quad under a material that is a network of shaders."""
 
+import numpy as np
 from test_materials import QUAD
 
 STANDARD = "ND_standard_surface_surfaceshader"
@@ -46,3 +47,13 @@ def image(name: str, file: str, kind: str = "color3", extra: str = "") -> str:
     """A MaterialX image."""
     usd = {"color3": "color3f", "float": "float", "vector3": "float3", "color4": "color4f", "vector2": "float2"}[kind]
     return node(name, f"ND_image_{kind}", f"asset inputs:file = @{file}@\n{extra}", f"{usd} outputs:out")
+
+
+def linear(codes: np.ndarray) -> np.ndarray:
+    """What codes of sRGB in [0, 1] mean."""
+    return np.where(codes <= 0.04045, codes / 12.92, ((codes + 0.055) / 1.055) ** 2.4)
+
+
+def extension(material: dict, name: str) -> dict:
+    """A KHR_materials extension of a glTF material; empty if it has none."""
+    return material.get("extensions", {}).get(f"KHR_materials_{name}", {})

@@ -284,6 +284,57 @@ def test_an_ies_profile_is_carried_as_a_file_beside(export, tmp_path, out):
     assert result.warned() == {"shaping of a DistantLight"} and "shaping" not in scene.lux("/Sun")
 
 
+def test_a_profile_that_is_gone_is_written_again(export, tmp_path):
+    from conftest import Gltf
+
+    (tmp_path / "in").mkdir()
+    (tmp_path / "in" / "lamp.ies").write_text(IES)
+    text = """def SphereLight "L" (prepend apiSchemas = ["ShapingAPI"]) {
+        asset inputs:shaping:ies:file = @in/lamp.ies@
+    }"""
+    first = export(text, out="out/scene.glb")
+    assert "up to date" in export(text, out="out/scene.glb").out
+    carried = first.path.parent / Gltf(first.path).lux("/L")["shaping"]["ies"]["file"]
+    carried.unlink()
+    assert "up to date" not in export(text, out="out/scene.glb").out
+    assert carried.read_text() == IES
+
+
+def test_a_profile_of_many_lights_is_read_once(export, tmp_path, monkeypatch):
+    from conftest import Gltf
+    from usd_gltf.asset_files import AssetFiles
+
+    read, names = AssetFiles.read, []
+
+    def reading(self, owner, attribute, *arguments):
+        names.append(attribute.Get().path)
+        return read(self, owner, attribute, *arguments)
+
+    monkeypatch.setattr(AssetFiles, "read", reading)
+    for name in ("a", "b"):
+        (tmp_path / f"{name}.ies").write_text(IES.replace("1 0\n", f"{ord(name)} 0\n"))
+    result = export(
+        "".join(
+            f"""def SphereLight "L{at}" (prepend apiSchemas = ["ShapingAPI"]) {{
+                asset inputs:shaping:ies:file = @{"ab"[at % 2]}.ies@
+                float inputs:shaping:ies:angleScale = {at}
+            }}
+            """
+            for at in range(20)
+        )
+        + """def SphereLight "Gone" (prepend apiSchemas = ["ShapingAPI"]) { asset inputs:shaping:ies:file = @gone.ies@ }
+        def SphereLight "Gone2" (prepend apiSchemas = ["ShapingAPI"]) { asset inputs:shaping:ies:file = @gone.ies@ }"""
+    )
+    assert sorted(set(names)) == ["a.ies", "b.ies", "gone.ies"]
+    assert names.count("a.ies") == names.count("b.ies") == 1
+    scene = Gltf(result.path)
+    carried = [scene.lux(f"/L{at}")["shaping"]["ies"] for at in range(20)]
+    assert [ies.get("angleScale", 0) for ies in carried] == list(range(20))
+    assert len({ies["file"] for ies in carried[::2]}) == len({ies["file"] for ies in carried[1::2]}) == 1
+    assert carried[0]["file"] != carried[1]["file"]
+    assert [line["path"] for line in result.report["warnings"]] == ["/Gone", "/Gone2"]
+
+
 def test_a_profile_keeps_that_of_the_first_frame(export, tmp_path):
     from conftest import Gltf
 

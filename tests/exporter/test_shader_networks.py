@@ -256,20 +256,6 @@ def test_stages_without_materialx_do_not_load_it(tmp_path):
     assert done.stdout.splitlines()[-1] == "0 False"
 
 
-def test_a_missing_package_is_an_error_with_the_remedy(export, monkeypatch):
-    import sys
-
-    from usd_gltf import materialx_library
-
-    materialx_library.library.cache_clear()
-    materialx_library.definition.cache_clear()
-    monkeypatch.setitem(sys.modules, "MaterialX", None)
-    result = export(network(""))
-    assert result.code == 1
-    assert "pip install -r scripts/requirements.txt" in result.err
-    materialx_library.definition.cache_clear()
-
-
 def test_weights_and_colors_on_different_coordinates(export, tmp_path):
     picture(tmp_path / "a.png", 200, 100, 50)
     tiled = node(
