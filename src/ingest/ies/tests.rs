@@ -131,6 +131,36 @@ fn types_a_and_b_have_the_axes_of_the_standard() {
     }
 }
 
+/// Type B with both angles from 0 to 90, as it is with all of them; type A's verticals are those that it names.
+#[test]
+fn type_b_is_the_same_on_all_sides_of_what_begins_at_0() {
+    let (half, all) = (steps(0.0, 90.0, 9), steps(-90.0, 90.0, 18));
+    let at = |v: f64, h: f64| 1000.0 - 4.0 * v.abs() - 3.0 * h.abs() + 0.01 * v.abs() * h.abs();
+    let whole = profile(&file(2, &all, &all, at));
+    for (v, h) in [(&half, &half), (&half, &all), (&all, &half)] {
+        let web = profile(&file(2, v, h, at));
+        for phi in 0..72 {
+            for theta in [0.0, 20.0, 33.3, 60.0, 89.0] {
+                let toward = direction(theta, 5.1 * f64::from(phi));
+                let (own, expected) = (web.factor(toward), whole.factor(toward));
+                assert!(own > 0.0 && near(own, expected.into()), "{toward}: {own} {expected}");
+            }
+        }
+        assert_eq!(web.factor(DVec3::Z), 0.0);
+    }
+    // Verticals that begin beside 0 are those that there are; those that begin about 0 ascend.
+    let one_side = profile(&file(2, &steps(10.0, 90.0, 8), &half, at));
+    assert_eq!(one_side.factor(direction(50.0, 180.0)), 0.0);
+    assert!(one_side.factor(direction(50.0, 0.0)) > 0.0);
+    let rounded = table(&file(2, &[-0.005, 0.003, 45.0, 90.0], &[-0.004, 0.002, 90.0], at));
+    for angles in [rounded.around_rad, rounded.polar_rad] {
+        assert!(angles.len() > 3 && angles.windows(2).all(|two| two[0] < two[1]), "{angles:?}");
+    }
+    let upward = profile(&file(3, &half, &all, at));
+    assert_eq!(upward.factor(direction(60.0, 0.0)), 0.0);
+    assert!(upward.factor(direction(120.0, 0.0)) > 0.0);
+}
+
 #[test]
 fn a_cosine_has_its_flux_in_every_type() {
     // I = cos of the angle off the nadir: flux pi.
