@@ -59,6 +59,9 @@ pub struct IesTable {
     pub values: Vec<f32>,
 }
 
+/// What angles lose where they are computed, radians.
+const SLACK: f64 = 1e-9;
+
 impl IesTable {
     /// The integral of the table over all directions, and whether it reaches beyond a hemisphere about its pole.
     /// Each patch is bilinear, so the integral is exact but for rounding.
@@ -152,6 +155,15 @@ impl IesProfile {
     /// to the axis of a cone within a hemisphere.
     pub fn mean(&self) -> f32 {
         self.mean as f32
+    }
+
+    /// Whether no turn about -Z changes it.
+    pub fn is_round(&self) -> bool {
+        let (first, last) = (self.around_rad[0], self.around_rad[self.around_rad.len() - 1]);
+        let mut planes = self.values.chunks_exact(self.polar_rad.len());
+        let one = planes.next();
+        let is_all_around = self.around_rad.len() == 1 || last - first > TAU - SLACK;
+        self.pole == Pole::Nadir && is_all_around && planes.all(|plane| Some(plane) == one)
     }
 
     /// Its numbers, for hashes: angles in radians, then factors; the scale of angles last.
@@ -310,8 +322,6 @@ impl IesProfile {
 
 /// The interval of an ascending list that a number is in, and where in it: 0 at its beginning, 1 at its end.
 fn bracket(list: &[f64], at: f64) -> Option<(usize, f64)> {
-    // What angles lose where they are computed.
-    const SLACK: f64 = 1e-9;
     let (first, last) = (list[0], list[list.len() - 1]);
     if !(first - SLACK..=last + SLACK).contains(&at) {
         return None;
