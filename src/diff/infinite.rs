@@ -86,10 +86,10 @@ fn profile(scene: &Scene, kind: &LightKind) -> Profile {
         LightKind::Dome { texture: Some(texture), .. } => {
             let mut hasher = blake3::Hasher::new();
             add_texture(&mut hasher, &scene.textures[texture as usize]);
-            Profile { pattern: short(&hasher), half_angle_rad: None }
+            Profile { pattern: short(&hasher), half_angle_rad: None, turn: 0 }
         }
         LightKind::Distant { angle_rad, .. } => {
-            Profile { pattern: 0, half_angle_rad: Some(0.5 * angle_rad) }
+            Profile { pattern: 0, half_angle_rad: Some(0.5 * angle_rad), turn: 0 }
         }
         _ => Profile::default(),
     }

@@ -41,6 +41,8 @@ pub(super) struct Profile {
     pub pattern: u128,
     /// Half angle of the shaping, radians, if it has one.
     pub half_angle_rad: Option<f32>,
+    /// A hash of its axes in the world, if a turn about the one that it is aimed along changes what it lights; else 0.
+    pub turn: u64,
 }
 
 /// Everything that two versions of a light are compared by.

@@ -2,7 +2,8 @@
 
 use super::light::Profile;
 use crate::emitter::{Emitters, LightSource, MeshLight};
-use crate::scene::{IesProfile, LightKind, Pixels, Scene, Shaping, Texture};
+use crate::math::directions::light_axes;
+use crate::scene::{IesProfile, Pixels, Pose, Scene, Shaping, Texture};
 use rayon::prelude::*;
 
 /// Hashes of what the instances of a mesh light share. Each is computed once, however many instances
@@ -23,45 +24,60 @@ impl Profiles {
         }
     }
 
-    /// The profile of a light that is not infinite.
-    pub fn of_light(&self, scene: &Scene, source: LightSource) -> Profile {
-        let (shaping, texture) = match source {
+    /// The profile of a light that is not infinite, in a pose.
+    pub fn of_light(&self, scene: &Scene, pose: &Pose, source: LightSource) -> Profile {
+        let (shaping, texture, node) = match source {
             LightSource::Mesh { instance, mesh_light } => {
-                let shaping = scene.instances[instance as usize].shaping;
-                (shaping, self.textures[mesh_light as usize])
+                let instance = &scene.instances[instance as usize];
+                (instance.shaping, self.textures[mesh_light as usize], instance.node)
             }
-            LightSource::Light(row) => match scene.lights[row as usize].kind {
-                LightKind::Spot { shaping, .. } => (Some(shaping), 0),
-                LightKind::Sphere { shaping, .. } => (shaping, 0),
-                _ => (None, 0),
-            },
+            LightSource::Light(row) => {
+                let light = &scene.lights[row as usize];
+                (light.kind.shaping(), 0, light.node)
+            }
         };
         let half_angle_rad = shaping.map(|shaping| shaping.lit(scene).half_angle_rad as f32);
+        let ies = shaping.and_then(|shaping| shaping.ies(scene));
+        let turn = ies.filter(|ies| !ies.is_round()).map_or(0, |_| turn(pose, node));
         let mut hasher = blake3::Hasher::new();
         hasher.update(&texture.to_le_bytes());
         match shaping {
-            None => return Profile { pattern: texture, half_angle_rad },
+            None => return Profile { pattern: texture, half_angle_rad, turn },
             Some(Shaping::Khr { inner_rad, .. }) => {
                 hasher.update(&[1]).update(&inner_rad.to_le_bytes());
             }
-            Some(Shaping::Usd { softness, focus, focus_tint: [r, g, b], .. }) => {
+            Some(Shaping::Usd { cone_rad, softness, focus, focus_tint: [r, g, b], .. }) => {
                 hasher.update(&[2]);
                 for number in [softness, focus, r, g, b] {
                     hasher.update(&number.to_le_bytes());
                 }
-                let ies = shaping.and_then(|shaping| shaping.ies(scene));
+                // A narrower beam stands for the cone, which may still cut it off where it is aimed aside.
+                if ies.is_some() && half_angle_rad != Some(cone_rad) {
+                    hasher.update(&cone_rad.to_le_bytes());
+                }
                 ies.into_iter().flat_map(IesProfile::numbers).for_each(|number| {
                     hasher.update(&number.to_le_bytes());
                 });
             }
         }
-        Profile { pattern: short(&hasher), half_angle_rad }
+        Profile { pattern: short(&hasher), half_angle_rad, turn }
     }
 
     /// The hash of the emitters of a mesh light, in its own space.
     pub fn shape(&self, mesh_light: u32) -> u128 {
         self.shapes[mesh_light as usize]
     }
+}
+
+/// The hash of a light's axes in the world, but for what is rounding.
+fn turn(pose: &Pose, node: u32) -> u64 {
+    // A smaller turn is rounding, radians.
+    const LEAST: f64 = 2e-5;
+    let mut hasher = blake3::Hasher::new();
+    for number in light_axes(&pose.world(node)).to_cols_array() {
+        hasher.update(&((number / LEAST).round() as i32).to_le_bytes());
+    }
+    short(&hasher) as u64
 }
 
 /// Sixteen bytes of a hash: enough to tell versions apart.

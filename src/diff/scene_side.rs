@@ -99,7 +99,7 @@ impl<'a> SceneSide<'a> {
             energy: without_crumbs(summary.energy),
             emitters: summary.emitter_count,
             link: summary.link,
-            profile: self.profiles.of_light(self.scene, entry.source),
+            profile: self.profiles.of_light(self.scene, &self.pose, entry.source),
         });
         let infinite =
             (0..).zip(&self.infinite).map(|(row, light)| light.as_light(self.scene, row));

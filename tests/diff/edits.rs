@@ -5,8 +5,8 @@ use crate::street::{
 };
 use candelabra::diff::{Difference, Kind, Verb};
 use candelabra::scene::{
-    Channel, IesProfile, IesTable, Interpolation, Keys, LightKind, Pixels, Pole, Shaping, Texture,
-    TextureUse, Wrap,
+    Channel, IesProfile, IesTable, Interpolation, Keys, LightKind, Pixels, Pole, Scene, Shaping,
+    Texture, TextureUse, Wrap,
 };
 use glam::{DQuat, Vec2, Vec3};
 use std::f64::consts::TAU;
@@ -175,6 +175,57 @@ fn a_photometric_profile_is_a_pattern() {
     let found = diff(profiled(lamp), profiled(lamp.map(|value| 2.0 * value)));
     let told = aspects(&found, "spot");
     assert!(told.contains(&"pattern") && told.contains(&"energy"), "{told:?}");
+}
+
+/// The street whose spot has a photometric profile of four half planes, in a cone.
+fn with_beam(cone_deg: f32, values: [f32; 20]) -> Scene {
+    let mut scene = street();
+    let polar_rad = [0.0, 0.7, 0.9, 1.1, 1.3].into();
+    let around_rad = vec![0.0, 0.2, 0.4, TAU];
+    let table = IesTable { pole: Pole::Nadir, polar_rad, around_rad, values: values.into() };
+    scene.profiles.push(IesProfile::new("lamp.ies".into(), table, 0.0));
+    let LightKind::Spot { shaping, .. } = &mut scene.lights[SPOT].kind else { panic!() };
+    let (softness, focus, focus_tint) = (0.0, 0.0, [0.0; 3]);
+    let cone_rad = cone_deg.to_radians();
+    *shaping = Shaping::Usd { cone_rad, softness, focus, focus_tint, profile: Some(0) };
+    scene
+}
+
+#[test]
+fn a_cone_that_cuts_off_a_beam_aimed_aside_is_a_pattern() {
+    // The beam goes from 40 to 75 degrees off the axis on one side: it is narrower than the cone.
+    let aside = |cone_deg| {
+        let mut values = [0.0; 20];
+        values[5..10].copy_from_slice(&[0.0, 0.0, 1.0, 1.0, 0.0]);
+        with_beam(cone_deg, values)
+    };
+    assert!(diff(aside(60.0), aside(60.0)).is_same());
+    assert_eq!(aspects(&diff(aside(60.0), aside(70.0)), "spot"), ["pattern"]);
+}
+
+#[test]
+fn a_turn_about_its_own_axis_is_told_of_a_light_that_is_not_round() {
+    let turned = |mut scene: Scene, angle: f64| {
+        let node = node(&mut scene, "spot");
+        let candelabra::scene::Trs::Parts { rotation, .. } = &mut node.local else { panic!() };
+        *rotation *= DQuat::from_rotation_z(angle);
+        scene
+    };
+    let plane = [3.0, 2.0, 1.0, 1.0, 0.5];
+    let round = || with_beam(90.0, std::array::from_fn(|i| plane[i % 5]));
+    let oblong =
+        || with_beam(90.0, std::array::from_fn(|i| plane[i % 5] * [1.0, 2.0, 1.0, 1.0][i / 5]));
+    let is_same = |of: &dyn Fn() -> Scene, angle| diff(of(), turned(of(), angle)).is_same();
+    for angle in [1e-3, 0.5, 3.0] {
+        assert!(is_same(&round, angle), "{angle}");
+        let found = diff(oblong(), turned(oblong(), angle));
+        assert_eq!(aspects(&found, "spot"), ["transform"], "{angle}");
+        let Difference::Transform { turned_deg, .. } = only(&found).differences[0] else {
+            panic!()
+        };
+        assert!((turned_deg - angle.to_degrees() as f32).abs() < 0.05, "{turned_deg}");
+    }
+    assert!(is_same(&oblong, 0.0));
 }
 
 #[test]

@@ -83,15 +83,16 @@ impl Web {
         Ok(IesTable { pole: Pole::Nadir, polar_rad, around_rad, values: values.copied().collect() })
     }
 
-    /// Vertical angles turn about a horizontal axis, horizontal angles are to its side, clockwise.
+    /// Vertical angles turn about a horizontal axis, horizontal angles are to its side, clockwise. Either may begin at 0.
     fn type_b(self) -> Result<IesTable, String> {
         let mut planes = self.horizontal_planes(90.0)?;
         planes.reverse();
         let polar_rad = radians(planes.iter().map(|plane| (90.0 - plane.0).clamp(0.0, 180.0)));
-        let around_rad = radians(self.vertical_deg.iter().copied());
+        let turns = both_sides(self.vertical_deg.iter().copied().zip(0..).collect());
+        let around_rad = radians(turns.iter().map(|turn| turn.0));
         let width = self.vertical_deg.len();
-        let at = |column: usize| planes.iter().map(move |&(_, row)| row * width + column);
-        let values = (0..width).flat_map(at).map(|at| self.candela[at]);
+        let at = |&(_, column): &Plane| planes.iter().map(move |&(_, row)| row * width + column);
+        let values = turns.iter().flat_map(at).map(|at| self.candela[at]);
         Ok(IesTable { pole: Pole::Side, polar_rad, around_rad, values: values.collect() })
     }
 
@@ -104,12 +105,18 @@ impl Web {
                 "its horizontal angles go from {first} to {last}; in LM-63's types A and B they go from 0 or -90 to 90"
             ));
         }
-        if !is(first, 0.0) {
-            return Ok(given);
-        }
-        let other_side = given[1..].iter().rev().map(|&(angle, row)| (-angle, row));
-        Ok(other_side.chain(given.iter().copied()).collect())
+        Ok(both_sides(given))
     }
+}
+
+/// Planes, or angles in them, that begin at 0 are symmetric about it: then those of the other side too.
+fn both_sides(given: Vec<Plane>) -> Vec<Plane> {
+    if !is(given[0].0, 0.0) {
+        return given;
+    }
+    // What rounding has put before 0 is not mirrored to behind it, so that angles ascend.
+    let other_side = given.iter().rev().filter(|plane| plane.0 > given[0].0.abs());
+    other_side.map(|&(angle, row)| (-angle, row)).chain(given.iter().copied()).collect()
 }
 
 /// Planes up to an angle, and behind it the same in a mirror.

@@ -131,6 +131,36 @@ fn types_a_and_b_have_the_axes_of_the_standard() {
     }
 }
 
+/// Type B with both angles from 0 to 90, as it is with all of them; type A's verticals are those that it names.
+#[test]
+fn type_b_is_the_same_on_all_sides_of_what_begins_at_0() {
+    let (half, all) = (steps(0.0, 90.0, 9), steps(-90.0, 90.0, 18));
+    let at = |v: f64, h: f64| 1000.0 - 4.0 * v.abs() - 3.0 * h.abs() + 0.01 * v.abs() * h.abs();
+    let whole = profile(&file(2, &all, &all, at));
+    for (v, h) in [(&half, &half), (&half, &all), (&all, &half)] {
+        let web = profile(&file(2, v, h, at));
+        for phi in 0..72 {
+            for theta in [0.0, 20.0, 33.3, 60.0, 89.0] {
+                let toward = direction(theta, 5.1 * f64::from(phi));
+                let (own, expected) = (web.factor(toward), whole.factor(toward));
+                assert!(own > 0.0 && near(own, expected.into()), "{toward}: {own} {expected}");
+            }
+        }
+        assert_eq!(web.factor(DVec3::Z), 0.0);
+    }
+    // Verticals that begin beside 0 are those that there are; those that begin about 0 ascend.
+    let one_side = profile(&file(2, &steps(10.0, 90.0, 8), &half, at));
+    assert_eq!(one_side.factor(direction(50.0, 180.0)), 0.0);
+    assert!(one_side.factor(direction(50.0, 0.0)) > 0.0);
+    let rounded = table(&file(2, &[-0.005, 0.003, 45.0, 90.0], &[-0.004, 0.002, 90.0], at));
+    for angles in [rounded.around_rad, rounded.polar_rad] {
+        assert!(angles.len() > 3 && angles.windows(2).all(|two| two[0] < two[1]), "{angles:?}");
+    }
+    let upward = profile(&file(3, &half, &all, at));
+    assert_eq!(upward.factor(direction(60.0, 0.0)), 0.0);
+    assert!(upward.factor(direction(120.0, 0.0)) > 0.0);
+}
+
 #[test]
 fn a_cosine_has_its_flux_in_every_type() {
     // I = cos of the angle off the nadir: flux pi.
@@ -302,4 +332,90 @@ fn the_mean_of_a_uniform_profile_is_its_value_and_beams_up_are_about_z() {
     assert!(web.lit().half_angle_rad < FRAC_PI_2 && web.lit().axis.x < -0.8, "{:?}", web.lit());
     let dark = profile(&file(1, &[0.0, 90.0], &[0.0], |_, _| 0.0));
     assert_eq!((dark.mean(), dark.factor(DVec3::NEG_Z)), (0.0, 0.0));
+}
+
+/// A beam of some width in a dim hemisphere: its share of the mean is its integral times the cosine there, over pi.
+#[test]
+fn the_mean_sees_beams_however_narrow_and_wherever_they_are() {
+    for width in [1.0, 0.1, 1e-3] {
+        for (theta, phi) in [(60.0, 11.25), (20.0, 3.7), (85.0, 181.3)] {
+            let beside = |at: f64| [at - 0.5 * width, at, at + 0.5 * width];
+            let (v, h) = (
+                [vec![0.0], beside(theta).to_vec(), vec![90.0]].concat(),
+                [vec![0.0], beside(phi).to_vec(), vec![360.0]].concat(),
+            );
+            let at = |v: f64, h: f64| if v == theta && h == phi { 1e4 } else { 1e-3 };
+            let table = table(&file(1, &v, &h, at));
+            let dim = 1e-3 * TAU;
+            let beam = table.integral().0 - dim;
+            let mean = IesProfile::new(String::new(), table, 0.0).mean();
+            let expected = 1e-3 + beam * theta.to_radians().cos() / PI;
+            assert!(
+                (f64::from(mean) / expected - 1.0).abs() < 1e-3,
+                "{width} {theta}: {mean} {expected}"
+            );
+        }
+    }
+}
+
+/// Means of any table, against very many directions of the cone.
+#[test]
+fn the_mean_is_that_over_directions_of_the_lit_cone() {
+    let waves = |v: f64, h: f64| (2.0 + (v / 17.0).sin() + (h / 23.0).cos()).max(0.0);
+    let whole = |v: f64, h: f64| waves(v, h.min(360.0 - h));
+    let side = |v: f64, h: f64| if (40.0..=100.0).contains(&h) { waves(v, h) } else { 0.0 };
+    let all = steps(-90.0, 90.0, 18);
+    let texts = [
+        file(1, &steps(0.0, 180.0, 18), &steps(0.0, 360.0, 36), whole),
+        file(1, &steps(30.0, 80.0, 5), &steps(0.0, 360.0, 36), side),
+        file(1, &steps(0.0, 180.0, 18), &[0.0], waves),
+        file(2, &all, &all, waves),
+        file(3, &all, &all, waves),
+    ];
+    for (number, text) in texts.iter().enumerate() {
+        for scale in [0.0, 0.4, 1.7, -0.6, -1.5] {
+            let web = IesProfile::new(String::new(), table(text), scale);
+            let (lit, (mut sum, mut weights)) = (web.lit(), (0.0, 0.0));
+            let beyond = (lit.half_angle_rad - FRAC_PI_2).max(0.0);
+            // A spiral over the sphere.
+            const COUNT: usize = 200_000;
+            for i in 0..COUNT {
+                let z = 1.0 - 2.0 * (i as f64 + 0.5) / COUNT as f64;
+                let (sine, cosine) = (i as f64 * 2.399_963_229_728_653).sin_cos();
+                let across = (1.0 - z * z).sqrt();
+                let toward = DVec3::new(across * cosine, across * sine, z);
+                let off = lit.axis.angle_between(toward);
+                if off <= lit.half_angle_rad {
+                    let weight = (off - beyond).max(0.0).cos();
+                    sum += weight * f64::from(web.factor(toward));
+                    weights += weight;
+                }
+            }
+            let (mean, expected) = (f64::from(web.mean()), sum / weights);
+            assert!((mean / expected - 1.0).abs() < 0.01, "{number} {scale}: {mean} {expected}");
+        }
+    }
+}
+
+/// As many angles as a file may have, in one plane and in planes: what is lit is found without pieces that are kept.
+#[test]
+fn a_fine_profile_is_lit_where_it_shines() {
+    let polar_rad: Vec<f64> = (0..65_536).map(|i| PI * f64::from(i) / 65_535.0).collect();
+    let values: Vec<f32> =
+        polar_rad.iter().map(|&polar| f32::from(u8::from(polar < 1.0))).collect();
+    let one = |around_rad: Vec<f64>| {
+        let values = values.repeat(around_rad.len());
+        let table = IesTable {
+            pole: crate::scene::Pole::Nadir,
+            polar_rad: polar_rad.clone(),
+            around_rad,
+            values,
+        };
+        IesProfile::new(String::new(), table, 0.0)
+    };
+    for web in [one(vec![0.0]), one(vec![0.0, 2.0, TAU])] {
+        assert_eq!(web.lit().axis, DVec3::NEG_Z);
+        assert!((web.lit().half_angle_rad - 1.0).abs() < 1e-3 && (web.mean() - 1.0).abs() < 1e-3);
+        assert!(web.is_round());
+    }
 }

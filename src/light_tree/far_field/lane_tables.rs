@@ -17,6 +17,10 @@ const COUNT: usize = SIDE * SIDE;
 const PARTS: usize = 2;
 /// Bytes of tables that are kept: 64 MB. Clusters further from the root are weighed as their cones tell.
 const MOST_BYTES: usize = 64 << 20;
+/// Emitters that tables are made of: each is asked 1,024 times. Trees with more that are known have no tables.
+const MOST_EMITTERS: usize = 1 << 17;
+/// Groups whose leaves are summed at once: 1 MB.
+const CHUNK: usize = 1024;
 
 /// The intensity of a cluster by direction, over its energy.
 pub(super) struct Table {
@@ -147,14 +151,24 @@ impl FrameTree<'_> {
         lights: &dyn FarField,
         still: Option<&LaneTables>,
     ) -> LaneTables {
+        self.lane_tables_of(row, lights, still, MOST_EMITTERS)
+    }
+
+    /// The same, with tables if no more than so many emitters are known.
+    fn lane_tables_of(
+        &self,
+        row: u32,
+        lights: &dyn FarField,
+        still: Option<&LaneTables>,
+        most_emitters: usize,
+    ) -> LaneTables {
         let tree = &self.trees[row as usize];
         let first = tree.first_group as usize;
         let count = tree.group_count as usize;
         let groups = self.groups.get(first..).unwrap_or(&[]);
         let groups = &groups[..count.min(groups.len())];
-        let of_leaves: Vec<Option<Sum>> =
-            groups.par_iter().map(|group| of_leaves(group, lights)).collect();
-
+        let known: usize = groups.par_iter().map(|group| known_leaves(group, lights).count()).sum();
+        let has_tables = known <= most_emitters;
         let mut found = LaneTables {
             first_group: tree.first_group,
             rows: vec![u32::MAX; groups.len()],
@@ -167,11 +181,15 @@ impl FrameTree<'_> {
             let tree = self.instances.get(instance as usize).map(|instance| instance.tree);
             tree.is_some() && tree == self.still
         };
-        // What a group leads to stands behind it.
-        for (at, leaves) in of_leaves.into_iter().enumerate().rev() {
-            let group = &groups[at];
+        // What a group leads to stands behind it, in preorder: few sums wait for their groups.
+        let mut of_chunk: Vec<Option<Sum>> = Vec::new();
+        for (at, group) in groups.iter().enumerate().rev() {
+            if has_tables && of_chunk.is_empty() {
+                let chunk = &groups[at / CHUNK * CHUNK..=at];
+                of_chunk = chunk.par_iter().map(|group| of_leaves(group, lights)).collect();
+            }
             let mut lanes = [OfLane::UNKNOWN; WIDTH];
-            let mut sum = leaves.unwrap_or_else(empty);
+            let mut sum = of_chunk.pop().flatten();
             for (lane, own) in lanes.iter_mut().enumerate() {
                 let below = match group.link(lane) {
                     Link::Nothing => continue,
@@ -188,7 +206,8 @@ impl FrameTree<'_> {
                     }
                     Link::Instance(_) => None,
                 };
-                let Some(below) = below else { continue };
+                let Some(below) = below.filter(|_| has_tables) else { continue };
+                let sum = sum.get_or_insert_with(empty);
                 sum.iter_mut()
                     .zip(below.iter())
                     .for_each(|(sum, below)| *sum = (*sum + below).min(1e30));
@@ -200,13 +219,14 @@ impl FrameTree<'_> {
             if lanes == [OfLane::UNKNOWN; WIDTH] {
                 continue;
             }
+            found.rows[at] = found.lanes.len() as u32;
+            found.lanes.push(lanes);
+            let Some(mut sum) = sum else { continue };
             for lane in (0..WIDTH).filter(|&lane| lanes[lane] == OfLane::UNKNOWN) {
                 if group.link(lane) != Link::Nothing {
                     add_expected(&mut sum, group, lane);
                 }
             }
-            found.rows[at] = found.lanes.len() as u32;
-            found.lanes.push(lanes);
             of_groups[at] = Some(sum);
         }
         found.whole = of_groups.first_mut().and_then(Option::take);
@@ -214,14 +234,18 @@ impl FrameTree<'_> {
     }
 }
 
-/// The far fields of the leaves of a group that are known.
-fn of_leaves(group: &Group, lights: &dyn FarField) -> Option<Sum> {
-    let emitters = (0..WIDTH).filter_map(|lane| match group.link(lane) {
+/// The emitters of a group's leaves whose far fields are known.
+fn known_leaves(group: &Group, lights: &dyn FarField) -> impl Iterator<Item = u32> {
+    (0..WIDTH).filter_map(move |lane| match group.link(lane) {
         Link::Emitter(emitter) if lights.is_known(emitter) => Some(emitter),
         _ => None,
-    });
+    })
+}
+
+/// The far fields of the leaves of a group that are known.
+fn of_leaves(group: &Group, lights: &dyn FarField) -> Option<Sum> {
     let mut sum: Option<Sum> = None;
-    for emitter in emitters {
+    for emitter in known_leaves(group, lights) {
         let sum = sum.get_or_insert_with(empty);
         add(sum, PARTS, |direction| lights.intensity(emitter, direction));
     }
@@ -242,7 +266,13 @@ fn add_expected(sum: &mut Sum, group: &Group, lane: usize) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::bounds::{Aabb, Cone, LightBounds};
+    use crate::light_tree::{
+        LightList, LightLook, LightSummary, LightTree, LightTreeWriter, TreeKind,
+    };
+    use crate::store::AlignedBytes;
     use proptest::prelude::*;
+    use std::sync::atomic::{AtomicUsize, Ordering};
 
     proptest! {
         #[test]
@@ -264,5 +294,72 @@ mod tests {
             assert!((table.toward(to) - 0.5 * lobe(to)).abs() < 0.12, "{to}");
         }
         assert!((table.mean() - 1.5).abs() < 0.02);
+    }
+
+    /// Every emitter shines alike all around; counts how often it is asked.
+    struct Even(AtomicUsize);
+
+    impl FarField for Even {
+        fn is_known(&self, _: u32) -> bool {
+            true
+        }
+
+        fn intensity(&self, _: u32, _: Vec3) -> f32 {
+            self.0.fetch_add(1, Ordering::Relaxed);
+            1.0
+        }
+    }
+
+    /// So many point lights in a row.
+    fn row_of(count: u32) -> LightTree<AlignedBytes> {
+        let bounds: Vec<LightBounds> = (0..count)
+            .map(|i| LightBounds {
+                aabb: Aabb { min: i as f32 * Vec3::X, max: i as f32 * Vec3::X },
+                cone: Cone::ALL,
+                energy: 1.0,
+                range_m: f32::INFINITY,
+            })
+            .collect();
+        let mut writer = LightTreeWriter::default();
+        writer.add_tree(TreeKind::Still, &bounds, |i| Link::Emitter(i as u32));
+        let light = LightSummary {
+            path: "/lights".into(),
+            fingerprint: [1; 32],
+            emitter_count: count,
+            energy: count as f32,
+            class: 0,
+            look: LightLook::default(),
+            link: 0,
+        };
+        LightTree::open(writer.finish(&LightList::new(&[light]), "{}", [2; 32])).unwrap()
+    }
+
+    /// In more chunks than one, every table is the sum of what is below it; beyond the bound nothing is asked.
+    #[test]
+    fn tables_are_made_of_all_intensities_up_to_a_bound() {
+        const COUNT_OF_ALL: u32 = 9000;
+        let tree = row_of(COUNT_OF_ALL);
+        let frame = tree.at_frame(0).unwrap();
+        assert!(frame.trees[0].group_count as usize > CHUNK);
+        let of = |most: usize| {
+            let lights = Even(AtomicUsize::new(0));
+            let found = frame.lane_tables_of(0, &lights, None, most);
+            (found, lights.0.into_inner())
+        };
+        let (found, asked) = of(COUNT_OF_ALL as usize);
+        assert_eq!(asked, COUNT_OF_ALL as usize * COUNT * PARTS * PARTS);
+        let whole = found.whole.as_ref().unwrap();
+        assert!(whole.iter().all(|&sum| (sum - COUNT_OF_ALL as f32).abs() < 1.0));
+        // Each has an energy of 1 an emitter.
+        assert!(found.tables.iter().all(|table| (table.mean() - 1.0).abs() < 1e-3));
+        let inner = |found: &LaneTables| {
+            found.lanes.iter().flatten().filter(|&&lane| found.table(lane).is_some()).count()
+        };
+        assert_eq!(inner(&found), frame.trees[0].group_count as usize - 1);
+        let (found, asked) = of(COUNT_OF_ALL as usize - 1);
+        assert!(asked == 0 && found.whole.is_none() && found.tables.is_empty());
+        // What a leaf is weighed by stays known.
+        let leaves = found.lanes.iter().flatten().filter(|&&lane| lane == OfLane::LEAF).count();
+        assert_eq!(leaves, COUNT_OF_ALL as usize);
     }
 }

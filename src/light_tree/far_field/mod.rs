@@ -11,7 +11,9 @@
 //! (`place`).
 //!
 //! Tables follow from the tree and the far fields, so the file holds nothing of them. They are of trees in world space.
-//! Lights that have a tree of their own, because they are instanced or move, are weighed as their cones tell.
+//! Lights that have a tree of their own, because they are instanced or move, are weighed as their cones tell. So are the clusters
+//! of a tree in which more than 131,072 emitters have known far fields, as large meshes have triangles: its leaves alone
+//! are weighed by intensity. Time and memory to make tables are bounded by that.
 
 mod lane_tables;
 

@@ -1,5 +1,7 @@
 //! Photometric profiles: how the light of a luminaire depends on direction, as it was measured.
 
+mod mean;
+
 use glam::DVec3;
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
@@ -59,6 +61,9 @@ pub struct IesTable {
     pub values: Vec<f32>,
 }
 
+/// What angles lose where they are computed, radians.
+const SLACK: f64 = 1e-9;
+
 impl IesTable {
     /// The integral of the table over all directions, and whether it reaches beyond a hemisphere about its pole.
     /// Each patch is bilinear, so the integral is exact but for rounding.
@@ -89,6 +94,9 @@ fn along_meridian([from, to]: [f64; 2], [first, last]: [f32; 2]) -> f64 {
     let (first, last) = (f64::from(first), f64::from(last));
     // From the middle of the patch nothing cancels, however narrow it is.
     let (middle, half) = (0.5 * (from + to), 0.5 * (to - from));
+    if half <= 0.0 {
+        return 0.0;
+    }
     let (sin, cos) = middle.sin_cos();
     // sin h - h cos h
     let odd = if half < 1e-2 {
@@ -120,8 +128,12 @@ impl IesProfile {
             lit: everywhere,
             mean: 0.0,
         };
-        profile.lit = profile.find_lit();
-        profile.mean = profile.find_mean();
+        let lit = profile.find_lit();
+        profile.mean = profile.mean_over(lit);
+        // A hair for what rounding loses.
+        let wider = (lit.half_angle_rad * (1.0 + 1e-6) + 1e-6).min(PI);
+        let half_angle_rad = if lit.half_angle_rad > 0.0 { wider } else { 0.0 };
+        profile.lit = LitCone { half_angle_rad, ..lit };
         profile
     }
 
@@ -152,6 +164,15 @@ impl IesProfile {
     /// to the axis of a cone within a hemisphere.
     pub fn mean(&self) -> f32 {
         self.mean as f32
+    }
+
+    /// Whether no turn about -Z changes it.
+    pub fn is_round(&self) -> bool {
+        let (first, last) = (self.around_rad[0], self.around_rad[self.around_rad.len() - 1]);
+        let mut planes = self.values.chunks_exact(self.polar_rad.len());
+        let one = planes.next();
+        let is_all_around = self.around_rad.len() == 1 || last - first > TAU - SLACK;
+        self.pole == Pole::Nadir && is_all_around && planes.all(|plane| Some(plane) == one)
     }
 
     /// Its numbers, for hashes: angles in radians, then factors; the scale of angles last.
@@ -192,21 +213,28 @@ impl IesProfile {
         (low + ahead * (high - low)) as f32
     }
 
+    /// The angle that is [scaled](Self::scaled) to one of the table, where no pole stands for what is beyond it. It may be
+    /// beyond `[0, pi]`.
+    fn unclamped(&self, scaled: f64) -> f64 {
+        match self.angle_scale {
+            scale if scale > 0.0 => scaled * scale,
+            scale if scale < 0.0 => PI - (PI - scaled) * -scale,
+            _ => scaled,
+        }
+    }
+
     /// The angles off the nadir between which a stretch of scaled angles lies.
     fn unscaled(&self, [from, to]: [f64; 2]) -> [f64; 2] {
+        let [low, high] = [from, to].map(|scaled| self.unclamped(scaled).clamp(0.0, PI));
+        // Beyond a pole the angle stays that of the pole.
         match self.angle_scale {
-            // Beyond a pole the angle stays that of the pole.
-            scale if scale > 0.0 => {
-                [from * scale, if to >= PI { PI } else { (to * scale).min(PI) }]
-            }
-            scale if scale < 0.0 => {
-                let low = if from <= 0.0 { 0.0 } else { (PI - (PI - from) * -scale).max(0.0) };
-                [low, PI - (PI - to) * -scale]
-            }
+            scale if scale > 0.0 => [low, if to >= PI - SLACK { PI } else { high }],
+            scale if scale < 0.0 => [if from <= SLACK { 0.0 } else { low }, high],
             _ => [from, to],
         }
     }
 
+    /// A cone outside which it is dark, but for rounding.
     fn find_lit(&self) -> LitCone {
         let everywhere = LitCone { axis: DVec3::NEG_Z, half_angle_rad: PI };
         if self.pole == Pole::Side && self.angle_scale != 0.0 {
@@ -220,18 +248,19 @@ impl IesProfile {
                 .iter()
                 .any(|&(p, r)| lit(p, r))
         };
-        let cells: Vec<(usize, usize)> = (0..planes.max(2) - 1)
-            .flat_map(|plane| (0..width - 1).map(move |row| (plane, row)))
-            .filter(|&(plane, row)| is_lit(plane, row))
-            .collect();
+        let cells = || {
+            (0..planes.max(2) - 1)
+                .flat_map(|plane| (0..width - 1).map(move |row| (plane, row)))
+                .filter(|&(plane, row)| is_lit(plane, row))
+        };
         let polar = |row: usize| {
             let stretch = [self.polar_rad[row], self.polar_rad[row + 1]];
             if self.pole == Pole::Nadir { self.unscaled(stretch) } else { stretch }
         };
-        let stretches = cells.iter().map(|&(_, row)| polar(row));
+        let stretches = cells().map(|(_, row)| polar(row));
         let (low, high) =
             stretches.fold((PI, 0.0f64), |(low, high), [from, to]| (low.min(from), high.max(to)));
-        if cells.is_empty() || low >= high {
+        if low >= high {
             return LitCone { axis: DVec3::NEG_Z, half_angle_rad: 0.0 };
         }
         let pole = self.direction(0.0, 0.0);
@@ -239,36 +268,36 @@ impl IesProfile {
         if PI - low < high {
             best = LitCone { axis: -pole, half_angle_rad: PI - low };
         }
-        // About the middle of what is lit, from pieces of cells that are small enough to count as discs.
-        let pieces = cells.iter().flat_map(|&(plane, row)| {
-            let [from, to] = polar(row);
-            let first = self.around_rad[plane];
-            let turn = if planes == 1 { TAU } else { self.around_rad[plane + 1] - first };
-            let steps = (turn / 0.1).ceil().max(1.0);
-            (0..steps as usize).map(move |step| {
-                let around = first + (step as f64 + 0.5) * turn / steps;
+        if planes == 1 {
+            return best;
+        }
+        // About the middle of what is lit, from pieces of cells that are small enough to count as discs. There may be many
+        // more pieces than values, so they are gone through twice and not kept.
+        let pieces = || {
+            cells().flat_map(|(plane, row)| {
+                let [from, to] = polar(row);
+                let first = self.around_rad[plane];
+                let turn = self.around_rad[plane + 1] - first;
+                let steps = (turn / 0.1).ceil().max(1.0);
                 let widest =
                     if (from..=to).contains(&FRAC_PI_2) { 1.0 } else { from.sin().max(to.sin()) };
                 let radius = 0.5 * (to - from) + 0.5 * widest * turn / steps;
-                (
-                    self.direction(0.5 * (from + to), around),
-                    radius,
-                    (from.cos() - to.cos()) * turn / steps,
-                )
+                let area = (from.cos() - to.cos()) * turn / steps;
+                (0..steps as usize).map(move |step| {
+                    let around = first + (step as f64 + 0.5) * turn / steps;
+                    (self.direction(0.5 * (from + to), around), radius, area)
+                })
             })
-        });
-        let pieces: Vec<(DVec3, f64, f64)> = pieces.collect();
-        let sum: DVec3 = pieces.iter().map(|&(middle, _, area)| middle * area).sum();
+        };
+        let sum: DVec3 = pieces().map(|(middle, _, area)| middle * area).sum();
         if let Some(axis) = sum.try_normalize() {
             let off = |middle: DVec3| axis.cross(middle).length().atan2(axis.dot(middle));
-            let half =
-                pieces.iter().map(|&(middle, radius, _)| off(middle) + radius).fold(0.0, f64::max);
+            let half = pieces().map(|(middle, radius, _)| off(middle) + radius).fold(0.0, f64::max);
             if half < best.half_angle_rad {
                 best = LitCone { axis, half_angle_rad: half };
             }
         }
-        // A hair for what rounding loses.
-        LitCone { half_angle_rad: (best.half_angle_rad * (1.0 + 1e-6) + 1e-6).min(PI), ..best }
+        best
     }
 
     /// The direction of two angles of the table, unit, in the light's own space.
@@ -279,44 +308,17 @@ impl IesProfile {
             Pole::Side => DVec3::new(-sin * sine, cos, -sin * cosine),
         }
     }
-
-    fn find_mean(&self) -> f64 {
-        const ROWS: usize = 128;
-        let LitCone { axis, half_angle_rad } = self.lit;
-        let is_round =
-            self.around_rad.len() == 1 && self.pole == Pole::Nadir && axis.z.abs() == 1.0;
-        let planes = if is_round { 1 } else { 48 };
-        let beyond = (half_angle_rad - FRAC_PI_2).max(0.0);
-        let (tangent, bitangent) = axis.any_orthonormal_pair();
-        let (mut sum, mut whole) = (0.0, 0.0);
-        for row in 0..ROWS {
-            // Closer rows where beams are.
-            let [from, at, to] = [0.0, 0.5, 1.0].map(|ahead| {
-                let share = (row as f64 + ahead) / ROWS as f64;
-                half_angle_rad * share * share
-            });
-            let weight = at.sin() * (at - beyond).max(0.0).cos() * (to - from) / planes as f64;
-            for plane in 0..planes {
-                let (sine, cosine) = ((plane as f64 + 0.5) * TAU / planes as f64).sin_cos();
-                let (sin, cos) = at.sin_cos();
-                let direction = axis * cos + (tangent * cosine + bitangent * sine) * sin;
-                sum += weight * f64::from(self.factor(direction));
-                whole += weight;
-            }
-        }
-        if whole > 0.0 { sum / whole } else { 0.0 }
-    }
 }
 
 /// The interval of an ascending list that a number is in, and where in it: 0 at its beginning, 1 at its end.
 fn bracket(list: &[f64], at: f64) -> Option<(usize, f64)> {
-    // What angles lose where they are computed.
-    const SLACK: f64 = 1e-9;
     let (first, last) = (list[0], list[list.len() - 1]);
     if !(first - SLACK..=last + SLACK).contains(&at) {
         return None;
     }
     let next = list.partition_point(|&own| own <= at).clamp(1, list.len() - 1);
     let (low, high) = (list[next - 1], list[next]);
-    Some((next - 1, ((at - low) / (high - low)).clamp(0.0, 1.0)))
+    // Angles that were kept to `[0, pi]` may have become one.
+    let ahead = if high > low { (at - low) / (high - low) } else { 0.0 };
+    Some((next - 1, ahead.clamp(0.0, 1.0)))
 }
