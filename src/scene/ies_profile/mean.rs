@@ -10,6 +10,8 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 const WIDEST: f64 = 0.1;
 /// Within less than this, weights do not bend, radians.
 const STRAIGHT: f64 = 0.02;
+/// So near is the edge of a table met that runs through directions anyhow, radians.
+const EDGE: f64 = 0.002;
 /// Gauss's two points in an interval from -1 to 1, exact for cubics.
 const TWO: [f64; 2] = [-0.577_350_269_189_625_8, 0.577_350_269_189_625_8];
 /// The one in its middle, exact for what is linear.
@@ -24,7 +26,7 @@ impl IesProfile {
         }
         let sum = match self.pole {
             // A scale turns the cells of a table about another axis into what no angles bound.
-            Pole::Side if self.angle_scale != 0.0 => self.over_band(cone, [0.0, PI]),
+            Pole::Side if self.angle_scale != 0.0 => self.over_band(cone, [0.0, PI], EDGE),
             _ => self.over_cells(cone) + self.over_clamped(cone),
         };
         (sum / whole).min(f32::MAX.into())
@@ -71,15 +73,17 @@ impl IesProfile {
     /// Over the directions that a scale of angles puts beyond a pole.
     fn over_clamped(&self, cone: LitCone) -> f64 {
         match self.angle_scale {
-            scale if scale > 0.0 && scale < 1.0 => self.over_band(cone, [scale * PI, PI]),
-            scale if scale < 0.0 && scale > -1.0 => self.over_band(cone, [0.0, PI + scale * PI]),
+            scale if scale > 0.0 && scale < 1.0 => self.over_band(cone, [scale * PI, PI], STRAIGHT),
+            scale if scale < 0.0 && scale > -1.0 => {
+                self.over_band(cone, [0.0, PI + scale * PI], STRAIGHT)
+            }
             _ => 0.0,
         }
     }
 
-    /// Between two angles off the nadir, at directions close by one another.
-    fn over_band(&self, cone: LitCone, [from, to]: [f64; 2]) -> f64 {
-        let rows = ((to - from) / STRAIGHT).ceil().max(1.0) as usize;
+    /// Between two angles off the nadir, in rows no higher than `step`.
+    fn over_band(&self, cone: LitCone, [from, to]: [f64; 2], step: f64) -> f64 {
+        let rows = ((to - from) / step).ceil().max(1.0) as usize;
         let columns = (TAU / STRAIGHT).ceil() as usize;
         let mut sum = 0.0;
         for (polar, height) in nodes([from, to], rows, &ONE) {
