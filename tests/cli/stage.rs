@@ -127,7 +127,7 @@ fn a_tree_of_a_stage_stands_beside_it_and_is_fresh() {
     stage.shot.write(SCENE, scene.replace("\"emissiveStrength\":20", "\"emissiveStrength\":30"));
     let ended = stage.render("--tree scene.ltree --complexity low --variant /A:b=c");
     assert_eq!(ended.code, Some(3), "{}", ended.err);
-    let remedy = "candelabra build scene.usda -o scene.ltree --complexity=low --variant=/A:b=c";
+    let remedy = "candelabra build scene.usda -o scene.ltree '--complexity=low' '--variant=/A:b=c'";
     assert!(ended.err.contains(remedy), "{}", ended.err);
 }
 
