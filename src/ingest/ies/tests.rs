@@ -419,3 +419,35 @@ fn a_fine_profile_is_lit_where_it_shines() {
         assert!(web.is_round());
     }
 }
+
+/// Rounding may put an angle beyond a pole. Kept to the pole, two angles are one, and nothing of width 0 counts.
+#[test]
+fn angles_beyond_a_pole_change_nothing() {
+    let vertical = [0.0, 45.0, 90.0, 135.0, 180.0];
+    let beyond = [0.0, 45.0, 90.0, 135.0, 180.0, 180.005];
+    let horizontal = steps(0.0, 360.0, 8);
+    let at = |v: f64, h: f64| 10.0 + v.min(180.0) + h.min(360.0 - h);
+    // Type B: both ends of its horizontal angles.
+    let (sides, wider) =
+        (steps(-90.0, 90.0, 6), [vec![-90.005], steps(-90.0, 90.0, 6), vec![90.005]].concat());
+    let aside = |v: f64, h: f64| 10.0 + v + h.clamp(-90.0, 90.0);
+    for scale in [0.0, 0.5, 2.0, -0.5] {
+        let of = |text: String| IesProfile::new(String::new(), table(&text), scale);
+        for [plain, rounded] in [
+            [file(1, &vertical, &horizontal, at), file(1, &beyond, &horizontal, at)],
+            [
+                file(2, &steps(-90.0, 90.0, 6), &sides, aside),
+                file(2, &steps(-90.0, 90.0, 6), &wider, aside),
+            ],
+        ] {
+            let (plain, rounded) = (of(plain), of(rounded));
+            let [a, b] = [&plain, &rounded].map(IesProfile::mean);
+            assert!((a - b).abs() <= 1e-6 * a, "{scale}: {a}, {b}");
+            assert!(rounded.lit().half_angle_rad.is_finite());
+            for theta in steps(0.0, 180.0, 12) {
+                let to = direction(theta, 30.0);
+                assert!(near(rounded.factor(to), plain.factor(to).into()), "{scale}, {theta}");
+            }
+        }
+    }
+}

@@ -52,6 +52,10 @@ impl IesProfile {
                     continue;
                 }
                 let ends = [self.polar_rad[row], self.polar_rad[row + 1]];
+                // Angles that were kept to `[0, pi]` may have become one.
+                if ends[1] <= ends[0] {
+                    continue;
+                }
                 let [from, to] = ends.map(|polar| self.unclamped(polar).clamp(0.0, PI));
                 let rows = pieces(to - from);
                 for (polar, height) in nodes([from, to], rows, &TWO) {
