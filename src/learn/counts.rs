@@ -1,9 +1,9 @@
 //! Counts of what is seen, by cell and lane.
 
 use super::pool::{Known, Tally};
+use crate::emitter::InfiniteLight;
 use crate::light_tree::learned::BESIDE;
 use crate::light_tree::{Cell, FrameTree, Front, FrontGroup, Picked, Receiver, WIDTH};
-use glam::Vec3;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicU32, Ordering};
 
@@ -15,9 +15,6 @@ pub struct Counts {
     lanes: Vec<Count>,
 }
 
-/// Of no cell, to ask how many lights there are.
-const ANYWHERE: Receiver = Receiver { point: Vec3::ZERO, normal: Vec3::Y };
-
 /// Rays to a cluster.
 #[derive(Default)]
 struct Count {
@@ -27,24 +24,24 @@ struct Count {
 
 impl Counts {
     /// Nothing counted yet. `lookers` are receivers of each cell; `most` groups are looked into in each, and
-    /// all lights beside the tree: `beside` gives their importances.
+    /// all lights beside the tree.
     pub fn new(
         tree: &FrameTree,
         lookers: &[Vec<Receiver>],
         most: usize,
-        beside: impl Fn(&Receiver) -> Vec<f64> + Sync,
+        beside: &[InfiniteLight],
     ) -> Counts {
         let front = |lookers: &Vec<Receiver>| {
             let mut front = tree.front(lookers, most);
-            let of_each: Vec<Vec<f64>> = lookers.iter().map(&beside).collect();
-            let count = of_each.first().map_or_else(|| beside(&ANYWHERE).len(), Vec::len);
-            let mean = |light: usize| {
-                let sum: f64 = of_each.iter().filter_map(|own| own.get(light)).sum();
-                sum / of_each.len().max(1) as f64
+            // In the unit of the tree's. Forced lights are not picked.
+            let mean = |light: &InfiniteLight| {
+                let of_each = lookers.iter().map(|looker| light.importance(looker.normal));
+                let sum: f64 = of_each.filter(|_| !light.forced).sum();
+                sum / lookers.len().max(1) as f64
             };
-            let rows = (0..count.div_ceil(WIDTH)).map(|row| FrontGroup {
-                group: BESIDE + row as u32,
-                importances: std::array::from_fn(|lane| mean(row * WIDTH + lane)),
+            let rows = (0..).zip(beside.chunks(WIDTH)).map(|(row, lights)| FrontGroup {
+                group: BESIDE + row,
+                importances: std::array::from_fn(|lane| lights.get(lane).map_or(0.0, mean)),
                 inner: [None; WIDTH],
             });
             front.groups.extend(rows);

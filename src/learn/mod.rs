@@ -12,7 +12,6 @@
 mod counts;
 mod pool;
 
-use crate::emitter::InfiniteLight;
 use crate::light_tree::learned::{Cells, Coordinates, Table, coordinates, divide};
 use crate::light_tree::veil::encode;
 use crate::light_tree::{LightTree, NoSuchFrame, Picked, Receiver, Splitting, Veil};
@@ -121,7 +120,7 @@ pub fn learn<E>(
                     let counts = counts.get_or_insert_with(|| {
                         let of_cell = |&[begin, end]: &[usize; 2]| lookers(&receivers[begin..end]);
                         let lookers: Vec<Vec<Receiver>> = ranges.iter().map(of_cell).collect();
-                        let beside = |receiver: &Receiver| beside(integrator, receiver);
+                        let beside = integrator.infinite;
                         Counts::new(integrator.picker.tree(), &lookers, groups, beside)
                     });
                     let seed = hash(hash(SEED, round + 1), frame as u32);
@@ -179,15 +178,6 @@ fn area(receivers: &[Coordinates]) -> Option<[[f32; 3]; 2]> {
         .map(place)
         .fold([place(first); 2], |[low, high], place| [low.min(place), high.max(place)]);
     Some([low.to_array(), high.to_array()])
-}
-
-/// The importances of the lights beside the tree for a receiver, in the unit of the tree's.
-fn beside(integrator: &Integrator, receiver: &Receiver) -> Vec<f64> {
-    let importance = |light: &InfiniteLight| match light.forced {
-        true => 0.0,
-        false => light.importance(receiver.normal),
-    };
-    integrator.infinite.iter().map(importance).collect()
 }
 
 /// Receivers that paths of a frame visit.
