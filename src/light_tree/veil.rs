@@ -12,7 +12,7 @@
 
 use super::group::WIDTH;
 use super::importance::{Cluster, Factors, Sight};
-use super::viewer::Viewer;
+use super::viewer::{Viewer, sees_as};
 use crate::math::Similarity;
 use bytemuck::{Pod, Zeroable};
 
@@ -112,29 +112,11 @@ pub struct Veiled<V> {
 }
 
 impl<V: Viewer> Viewer for Veiled<V> {
-    const IS_ORIENTED: bool = V::IS_ORIENTED;
+    sees_as!(viewer: V);
 
     #[inline(always)]
     fn cell(&self) -> Cell {
         self.cell
-    }
-
-    #[inline(always)]
-    fn factors(&self, cluster: &Cluster) -> Factors {
-        self.viewer.factors(cluster)
-    }
-
-    #[inline(always)]
-    fn reflect(&self, sight: &Sight) -> (f32, f32) {
-        self.viewer.reflect(sight)
-    }
-
-    fn glare(&self, cluster: &Cluster) -> f64 {
-        self.viewer.glare(cluster)
-    }
-
-    fn unit_of_importance(&self, scale: f64) -> f64 {
-        self.viewer.unit_of_importance(scale)
     }
 
     fn within(&self, space: &Similarity) -> Veiled<V> {

@@ -56,6 +56,32 @@ pub trait Viewer: Copy {
     }
 }
 
+/// What a viewer that knows more than another one sees: what the other one does.
+macro_rules! sees_as {
+    ($viewer:ident: $kind:ident) => {
+        const IS_ORIENTED: bool = $kind::IS_ORIENTED;
+
+        #[inline(always)]
+        fn factors(&self, cluster: &Cluster) -> Factors {
+            self.$viewer.factors(cluster)
+        }
+
+        #[inline(always)]
+        fn reflect(&self, sight: &Sight) -> (f32, f32) {
+            self.$viewer.reflect(sight)
+        }
+
+        fn glare(&self, cluster: &Cluster) -> f64 {
+            self.$viewer.glare(cluster)
+        }
+
+        fn unit_of_importance(&self, scale: f64) -> f64 {
+            self.$viewer.unit_of_importance(scale)
+        }
+    };
+}
+pub(super) use sees_as;
+
 /// A point where light is wanted.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Receiver {

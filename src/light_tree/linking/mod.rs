@@ -22,7 +22,7 @@ pub use same::SameLinks;
 
 use super::importance::{Cluster, Factors, Sight};
 use super::veil::Cell;
-use super::viewer::Viewer;
+use super::viewer::{Viewer, sees_as};
 use crate::math::Similarity;
 
 /// A class of receivers, by number.
@@ -118,7 +118,7 @@ pub struct Linked<V> {
 
 impl<V: Viewer> Viewer for Linked<V> {
     const IS_LINKED: bool = true;
-    const IS_ORIENTED: bool = V::IS_ORIENTED;
+    sees_as!(viewer: V);
 
     #[inline(always)]
     fn class(&self) -> ReceiverClass {
@@ -128,24 +128,6 @@ impl<V: Viewer> Viewer for Linked<V> {
     #[inline(always)]
     fn cell(&self) -> Cell {
         self.viewer.cell()
-    }
-
-    #[inline(always)]
-    fn factors(&self, cluster: &Cluster) -> Factors {
-        self.viewer.factors(cluster)
-    }
-
-    #[inline(always)]
-    fn reflect(&self, sight: &Sight) -> (f32, f32) {
-        self.viewer.reflect(sight)
-    }
-
-    fn glare(&self, cluster: &Cluster) -> f64 {
-        self.viewer.glare(cluster)
-    }
-
-    fn unit_of_importance(&self, scale: f64) -> f64 {
-        self.viewer.unit_of_importance(scale)
     }
 
     fn within(&self, space: &Similarity) -> Linked<V> {
