@@ -90,7 +90,7 @@ pub enum StageError {
         "{}: USD stages are exported by {SCRIPT}, which is {}; set {EXPORTER} to its path, or export the stage with it",
         scene.display(),
         looked_for.as_ref().map_or_else(
-            || "in no folder above this program".into(), |path| format!("not at {}", path.display())
+            || "in none of the four folders above this program".into(), |path| format!("not at {}", path.display())
         )
     )]
     NoExporter {

@@ -3,7 +3,8 @@
 //!
 //! `cargo bench --bench rays -- SCENE [FOLDER]` prints, for each kind, its name, rays a second (the best of several rounds) and how
 //! many rays hit something. With a folder it also writes the triangles and the rays there, for
-//! `scripts/rays_beside_embree.py`. Sphere lights and cut-outs are left out: other programs' triangles are the same then.
+//! `scripts/rays_beside_embree.py`. Sphere lights are left out and cut-outs are solid, as
+//! they are to the other program.
 
 use candelabra::emitter::{Emitters, PosedEmitters};
 use candelabra::math::random::hash;
