@@ -176,13 +176,17 @@ mod tests {
                 let cosine = (p - center.as_dvec3()).normalize_or_zero().dot(axis);
                 if two_sided { cosine.abs() } else { cosine }
             };
-            let length = f64::from(segment.length.min(100.0));
-            let seen = (0..=2000).map(|i| cosine(length * f64::from(i) / 2000.0));
-            let seen = seen.fold(-1.0, f64::max);
+            // Equal steps of a segment; steps that grow, out to 1000, of a ray without an end.
+            let way = |i: u32| {
+                let s = f64::from(i) / 1001.0;
+                if segment.length.is_finite() { s * f64::from(segment.length) } else { s / (1.0 - s) }
+            };
+            let seen = (0..=1000).map(|i| cosine(way(i))).fold(-1.0, f64::max);
             prop_assert!(seen <= largest + 1e-12, "{seen} {largest}");
             // What is closer than some steps is passed too fast to be seen.
-            let close2 = (2.5 * length / 2000.0).powi(2);
-            prop_assert!(seen >= largest - 2e-2 || segment.passage(center).nearest2 < close2);
+            let passage = segment.passage(center);
+            let step = if segment.length.is_finite() { way(1) } else { 0.02 };
+            prop_assert!(seen >= largest - 2e-2 || passage.nearest2 < (2.5 * step).powi(2));
         }
 
         /// A point light's importance is the integral over the segment of `I / d^2`.
