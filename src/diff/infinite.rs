@@ -72,7 +72,7 @@ fn ways(scene: &Scene, frames: &[i32]) -> HashMap<u32, [u8; 32]> {
         nodes.map(|node| (node, blake3::Hasher::new())).collect();
     let mut posing = Posing::new(scene);
     for &frame in if ways.is_empty() { &[] } else { frames } {
-        let pose = posing.at_frame(frame);
+        let pose = posing.at_frame(f64::from(frame));
         for (&node, way) in &mut ways {
             way.update(bytemuck::bytes_of(&pose.world(node).matrix3.to_cols_array()));
         }

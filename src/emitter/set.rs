@@ -58,7 +58,7 @@ pub struct LightEntry {
     /// Whether it is left out of all estimates and sampled at every point.
     pub forced: bool,
     /// Whether a tree in the space of its own mesh serves it, shared with other instances or carried
-    /// along: its node's transform keeps shapes at every time.
+    /// along: its node's transform keeps shapes at every time, and does not change while a shutter is open.
     pub in_own_space: bool,
     /// What it is linked by.
     pub links: Links,
@@ -303,6 +303,8 @@ fn mesh_entries(
         |node: u32| rigid[node as usize] && Similarity::undoing(&still.world(node)).is_some();
     let mut users = vec![0u32; mesh_lights.len()];
     of_instance.iter().flatten().for_each(|&row| users[row as usize] += 1);
+    // A tree stands in one place; what is blurred is in many.
+    let is_blurred = !scene.shutters().is_empty();
     let rows = scene.instances.iter().zip(of_instance).enumerate();
     let entry = |(i, (instance, row)): (usize, (&crate::scene::Instance, &Option<u32>))| {
         let mesh_light = (*row)?;
@@ -310,13 +312,14 @@ fn mesh_entries(
         let (moves, varies) =
             (moving[instance.node as usize], instance.values.as_ref().is_some_and(Keys::varies));
         let is_shared = users[mesh_light as usize] > 1 || moves || varies;
+        let is_placed = !(moves && is_blurred) && keeps_shapes(instance.node);
         Some(LightEntry {
             path: instance.path.clone(),
             source: LightSource::Mesh { instance: i as u32, mesh_light },
             moves,
             varies,
             forced: instance.forced,
-            in_own_space: is_shared && count >= LEAST_TO_SHARE && keeps_shapes(instance.node),
+            in_own_space: is_shared && count >= LEAST_TO_SHARE && is_placed,
             links: scene.linking.of_instance(i as u32),
             link: 0,
             first: 0,

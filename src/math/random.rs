@@ -44,6 +44,13 @@ impl Sampler {
     }
 }
 
+/// A number in `[0, 1)` for sample `index` of what `seed` stands for, stratified over the indices.
+#[inline]
+pub fn stratified(seed: u32, index: u32) -> f32 {
+    let seed = hash(seed, index / SEQUENCE_LENGTH);
+    sobol_burley::sample(index % SEQUENCE_LENGTH, 0, seed)
+}
+
 /// Extends a number with 24 random bits to 48 by hashing it together with `salt`: enough to
 /// address every one of millions of lights. The first 24 bits, and with them the stratification,
 /// stay.

@@ -13,19 +13,21 @@ use super::passes::{Control, Progress, Uniform};
 use super::path::{Integrator, PathScratch, TraceStats};
 use super::picker::LightPicker;
 use super::plan::{Plan, PlanError};
-use super::rays::RayScene;
+use super::rays::{RayScene, Tracer};
 use super::settings::RenderSettings;
 use super::surface::Surfaces;
 use crate::emitter::{Emitters, InfiniteLight, PosedEmitters, Skies};
 use crate::light_tree::learned::Learned;
 use crate::light_tree::{LightTree, NoSuchFrame};
-use crate::math::random::hash;
-use crate::scene::{Camera, Scene};
+use crate::math::random::{hash, stratified};
+use crate::scene::{Camera, Pose, Scene};
 use rayon::prelude::*;
 use thiserror::Error;
 
 /// After so many samples it is asked whether to stop.
 const SAMPLES_BETWEEN_STOPS: u64 = 256;
+/// Tells the random number that chooses a time from others.
+const TIME: u32 = 0x7469_6d65;
 
 /// What does not change between the frames of a shot: geometry, textures, ray acceleration.
 pub struct RenderDelegate<'a> {
@@ -142,37 +144,81 @@ impl<'a> RenderDelegate<'a> {
         learned: Option<&Learned>,
         work: impl FnOnce(&Integrator) -> T,
     ) -> Result<T, NoSuchFrame> {
-        let pose = self.scene.pose_at(self.scene.timeline.seconds_at(f64::from(frame)));
-        let infinite = self.skies.lights(self.scene, &pose);
+        let pose = [self.pose(frame.into())];
+        self.at_poses(tree, frame, &pose, learned, |integrators| work(&integrators[0]))
+    }
+
+    /// Calls `work` with a frame that is ready to be traced at each of some poses. Lights at infinity are as they are
+    /// at the frame itself: the picture of a dome is laid out once.
+    fn at_poses<T>(
+        &self,
+        tree: &LightTree<impl AsRef<[u8]>>,
+        frame: i32,
+        poses: &[Pose],
+        learned: Option<&Learned>,
+        work: impl FnOnce(&[Integrator]) -> T,
+    ) -> Result<T, NoSuchFrame> {
         assert_eq!(tree.emitter_count(), self.emitters.len(), "the tree belongs to another scene");
         let learned = learned.filter(|learned| learned.tree == tree.still_key());
-        let emitters = PosedEmitters { scene: self.scene, emitters: self.emitters, pose: &pose };
-        let file = tree;
+        let infinite = match poses {
+            [pose] => self.skies.lights(self.scene, pose),
+            _ => self.skies.lights(self.scene, &self.pose(frame.into())),
+        };
+        let tracers = self.tracers(poses);
+        let at_pose = |pose| PosedEmitters { scene: self.scene, emitters: self.emitters, pose };
+        let emitters: Vec<PosedEmitters> = poses.iter().map(at_pose).collect();
+        // A single tracer is that of all poses.
+        let tracer_of = tracers.iter().chain(std::iter::repeat(&tracers[0]));
+        let integrators = emitters.iter().zip(tracer_of).map(|(emitters, tracer)| {
+            self.integrator(tree, frame, (emitters, tracer, &infinite), learned)
+        });
+        Ok(work(&integrators.collect::<Result<Vec<_>, _>>()?))
+    }
+
+    /// What rays hit in some poses: of each, or once if they differ in nothing that a ray can hit.
+    fn tracers(&self, poses: &[Pose]) -> Vec<Tracer<'_>> {
+        let alike = |pose: &Pose| self.scene.has_all_in_place(&poses[0], pose);
+        let several = if poses[1..].iter().all(alike) { &poses[..1] } else { poses };
+        several.par_iter().map(|pose| self.geometry.for_pose(self.scene, pose)).collect()
+    }
+
+    fn integrator<'s>(
+        &'s self,
+        file: &'s LightTree<impl AsRef<[u8]>>,
+        frame: i32,
+        (emitters, tracer, infinite): (
+            &'s PosedEmitters<'s>,
+            &'s Tracer<'s>,
+            &'s [InfiniteLight<'s>],
+        ),
+        learned: Option<&Learned<'s>>,
+    ) -> Result<Integrator<'s>, NoSuchFrame> {
+        let pose = emitters.pose;
         let tree = match &self.links {
-            Some(links) => tree.at_frame_linked(frame, links.lit_by())?,
-            None => tree.at_frame(frame)?,
+            Some(links) => file.at_frame_linked(frame, links.lit_by())?,
+            None => file.at_frame(frame)?,
         };
         let tree = match self.scene.profiles.is_empty() {
             true => tree,
-            false => self.far_fields.told(file, tree, &emitters),
+            false => self.far_fields.told(file, tree, emitters),
         };
         let tree = match learned {
             Some(learned) => tree.veiled(learned.veils),
             None => tree,
         };
-        let links = self.links.as_ref().map(|shot| FrameLinks { shot, infinite: &infinite });
+        let links = self.links.as_ref().map(|shot| FrameLinks { shot, infinite });
         let (width, height) = (self.settings.width, self.settings.height);
-        Ok(work(&Integrator {
+        Ok(Integrator {
             settings: &self.settings,
-            tracer: self.geometry.for_pose(self.scene, &pose),
-            surfaces: Surfaces::new(self.scene, &pose),
-            emitters,
-            infinite: &infinite,
-            picker: LightPicker::new(&self.settings, tree, &infinite).linked(links),
+            tracer,
+            surfaces: Surfaces::new(self.scene, pose),
+            emitters: *emitters,
+            infinite,
+            picker: LightPicker::new(&self.settings, tree, infinite).linked(links),
             links,
-            camera: CameraRays::new(&self.camera, &pose, width, height),
+            camera: CameraRays::new(&self.camera, pose, width, height),
             cells: learned.map(|learned| learned.cells),
-            fog: Fog::new(self.scene, &pose, &self.camera),
+            fog: Fog::new(self.scene, pose, &self.camera),
             groups: self.plan.as_ref().ok().and_then(|plan| plan.groups.as_ref()),
             found_by_reflection: match self.settings.mis {
                 true if infinite.iter().any(InfiniteLight::meets_reflections) => {
@@ -181,7 +227,28 @@ impl<'a> RenderDelegate<'a> {
                 true if self.has_surfaces_that_shine => FoundByReflection::Surfaces,
                 _ => FoundByReflection::Nothing,
             },
-        }))
+        })
+    }
+
+    /// Where everything is at a frame, which may be between two whole ones.
+    fn pose(&self, frame: f64) -> Pose {
+        self.scene.pose_at(self.scene.timeline.seconds_at(frame))
+    }
+
+    /// The times at which the camera sees a frame: one, if it has no shutter or nothing changes while that is
+    /// open.
+    fn times(&self, frame: i32) -> Vec<(f64, Pose)> {
+        let instant = || (f64::from(frame), self.pose(frame.into()));
+        if !self.settings.motion_blur {
+            return vec![instant()];
+        }
+        let times = self.scene.times_of(&self.camera, frame).into_iter();
+        let times: Vec<(f64, Pose)> = times.map(|time| (time, self.pose(time))).collect();
+        let (_, first) = &times[0];
+        match times.iter().all(|(_, pose)| pose == first) {
+            true => vec![instant()],
+            false => times,
+        }
     }
 
     /// A film for a frame that has no samples yet.
@@ -231,21 +298,23 @@ impl<'a> RenderDelegate<'a> {
         progress: &impl Progress,
     ) -> Result<RenderedFrame, RenderError> {
         let plan = self.plan.as_ref().map_err(Clone::clone)?;
-        self.at_frame(tree, frame, |integrator| {
-            let pose = integrator.emitters.pose;
+        let (times, poses): (Vec<f64>, Vec<Pose>) = self.times(frame).into_iter().unzip();
+        self.at_poses(tree, frame, &poses, self.learned.as_ref(), |integrators| {
             let size = [self.settings.width, self.settings.height];
-            let motion = || Motion::new(self.scene, pose, &self.camera, frame, size);
-            let shown = Shown {
+            let shows_motion = plan.layers.iter().any(|layer| layer.aov == Aov::Motion);
+            let shown = times.iter().zip(&poses).map(|(&time, pose)| Shown {
                 layers: &plan.layers,
                 origin: self.scene.origin,
-                motion: plan.layers.iter().any(|layer| layer.aov == Aov::Motion).then(motion),
+                motion: shows_motion
+                    .then(|| Motion::new(self.scene, pose, &self.camera, time, size)),
                 ids: plan.ids.as_ref(),
-            };
+            });
+            let shown: Vec<Shown> = shown.collect();
             let seed = hash(self.settings.seed, frame as u32);
             loop {
                 if film.missing() > 0 {
                     progress.expects(film.samples(), control.expected(film));
-                    let is_done = self.pass(integrator, &shown, seed, film, progress);
+                    let is_done = self.pass(integrators, &shown, seed, film, progress);
                     control.passed(film);
                     if !is_done && !control.is_done_if_stopped() {
                         return Err(RenderError::Stopped);
@@ -259,17 +328,18 @@ impl<'a> RenderDelegate<'a> {
                     None => break,
                 }
             }
-            let mut buffers = film.develop(&shown);
+            let mut buffers = film.develop(&shown[0]);
             buffers.manifest = plan.ids.as_ref().map(|ids| ids.manifest(self.scene, &buffers));
             Ok(RenderedFrame { buffers, stats: film.stats() })
         })?
     }
 
-    /// Takes the samples that a film lacks. Whether it got that far before it was stopped.
+    /// Takes the samples that a film lacks, each at one of the frame's times. Whether it got that far before it
+    /// was stopped.
     fn pass(
         &self,
-        integrator: &Integrator,
-        shown: &Shown,
+        integrators: &[Integrator],
+        shown: &[Shown],
         frame_seed: u32,
         film: &mut Film,
         progress: &impl Progress,
@@ -289,8 +359,9 @@ impl<'a> RenderDelegate<'a> {
                     since_asked = (since_asked + 1) % SAMPLES_BETWEEN_STOPS;
                     since_told += 1;
                     let (seed, index) = scrambled(seed, sample);
-                    let path = integrator.trace(x, y, seed, index, &mut scratch);
-                    row.add(at, &path, &scratch.by_group, scratch.blocked, shown);
+                    let time = time_of(seed, index, integrators.len());
+                    let path = integrators[time].trace(x, y, seed, index, &mut scratch);
+                    row.add(at, &path, &scratch.by_group, scratch.blocked, &shown[time]);
                 }
             }
             progress.samples_taken(since_told);
@@ -309,4 +380,13 @@ impl<'a> RenderDelegate<'a> {
 /// [`film`](super::film).
 fn scrambled(seed: u32, sample: u32) -> (u32, u32) {
     (hash(seed, half_of(sample) as u32), sample / 2)
+}
+
+/// Which of a frame's times a sample is taken at: stratified over the samples of a sequence.
+#[inline]
+fn time_of(seed: u32, index: u32, times: usize) -> usize {
+    match times {
+        1 => 0,
+        _ => (stratified(hash(seed, TIME), index) * times as f32) as usize,
+    }
 }

@@ -22,17 +22,18 @@ pub struct Motion<'a> {
 }
 
 impl<'a> Motion<'a> {
-    /// Poses the scene in the frames after and before `frame`, whose pose is given.
+    /// Poses the scene one frame after and one before `frame`, whose pose is given. It may be between two whole
+    /// ones.
     pub fn new(
         scene: &'a Scene,
         pose: &'a Pose,
         camera: &Camera,
-        frame: i32,
+        frame: f64,
         [width, height]: [u32; 2],
     ) -> Motion<'a> {
         let rays = |pose: &Pose| CameraRays::new(camera, pose, width, height);
         let neighbours = [1.0, -1.0].map(|step| {
-            let pose = scene.pose_at(scene.timeline.seconds_at(f64::from(frame) + step));
+            let pose = scene.pose_at(scene.timeline.seconds_at(frame + step));
             let rays = rays(&pose);
             (pose, rays)
         });

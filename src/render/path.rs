@@ -36,7 +36,7 @@ pub struct Integrator<'a> {
     /// Knobs.
     pub settings: &'a RenderSettings,
     /// What rays hit.
-    pub tracer: Tracer<'a>,
+    pub tracer: &'a Tracer<'a>,
     /// What is there.
     pub surfaces: Surfaces<'a>,
     /// What shines.

@@ -68,6 +68,8 @@ pub struct RenderSettings {
     /// Multiple importance sampling: picked lights are weighed against lights that reflected rays hit.
     /// Without it, lights are found by picking alone.
     pub mis: bool,
+    /// What moves while the camera's shutter is open is blurred. Without it, a frame is an instant.
+    pub motion_blur: bool,
     /// What is written of a frame. The beauty always is.
     pub aovs: Vec<Aov>,
     /// The beauty is stored in 32 bits instead of 16.
@@ -91,6 +93,7 @@ impl Default for RenderSettings {
             max_lights: 64,
             split_by: SplitBy::default(),
             mis: true,
+            motion_blur: true,
             aovs: Aov::DEFAULT.to_vec(),
             float_beauty: false,
             light_groups: Vec::new(),

@@ -1,5 +1,7 @@
 //! Cameras.
 
+use super::Shutter;
+
 /// A camera that looks along its node's -Z with +Y up (glTF's convention, and USD's).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Camera {
@@ -22,6 +24,8 @@ pub struct Camera {
     /// still cast shadows and are seen in reflections. Metres along the view axis, ascending; the
     /// second may be infinite.
     pub clip_m: [f32; 2],
+    /// When its shutter is open; `None` for an instant.
+    pub shutter: Option<Shutter>,
 }
 
 /// How points of the scene come to the film.
@@ -51,6 +55,7 @@ impl Camera {
             film_offset: [0.0; 2],
             exposure_scale: 1.0,
             clip_m: [0.0, f32::INFINITY],
+            shutter: None,
         }
     }
 

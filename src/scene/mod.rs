@@ -35,6 +35,7 @@ mod note;
 mod pose;
 mod posing;
 mod requirements;
+mod shutter;
 mod source_file;
 mod steady;
 mod texture;
@@ -53,6 +54,7 @@ pub use note::{Category, Note};
 pub use pose::{Channel, Interpolation, Keys, Node, Pose, Trs};
 pub use posing::Posing;
 pub use requirements::Requirements;
+pub use shutter::Shutter;
 pub use source_file::SourceFile;
 pub use texture::{Pixels, Texture, TextureUse, Wrap};
 pub use timeline::Timeline;
@@ -105,6 +107,14 @@ impl Scene {
     /// Where everything is and how strong it shines at `time_s` seconds on the file's clock.
     pub fn pose_at(&self, time_s: f64) -> Pose {
         Pose::evaluate(self, time_s).0
+    }
+
+    /// Whether all that a ray can hit is in the same place in two poses.
+    pub fn has_all_in_place(&self, one: &Pose, other: &Pose) -> bool {
+        let instances = self.instances.iter().map(|instance| instance.node);
+        let lights = self.lights.iter().filter(|light| !light.kind.is_infinite());
+        let mut nodes = instances.chain(lights.map(|light| light.node));
+        nodes.all(|node| one.world(node) == other.world(node))
     }
 
     /// For each node, whether it moves with time.

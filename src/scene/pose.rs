@@ -71,7 +71,7 @@ pub enum Interpolation {
 }
 
 /// Whatever varies, at one time: world transforms of all nodes, strengths of the lights with keys.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Pose {
     pub(super) world: Vec<Affine3A>,
     /// By row of [`Scene::lights`]; empty if none has keys.

@@ -36,10 +36,10 @@ impl<'a> Posing<'a> {
         }
     }
 
-    /// The pose at a frame: what [`Scene::pose_at`] gives for its time.
-    pub fn at_frame(&mut self, frame: i32) -> &Pose {
+    /// The pose at a frame, which may be between two whole ones: what [`Scene::pose_at`] gives for its time.
+    pub fn at_frame(&mut self, frame: f64) -> &Pose {
         let timeline = self.scene.timeline;
-        let at = Instant { time_s: timeline.seconds_at(f64::from(frame)), timeline };
+        let at = Instant { time_s: timeline.seconds_at(frame), timeline };
         let Posing { scene, exact, pose, .. } = self;
         for &row in &self.moving {
             let node = &scene.nodes[row];

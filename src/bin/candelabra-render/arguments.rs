@@ -69,6 +69,9 @@ pub struct Arguments {
     /// Another seed, another noise
     #[arg(long, default_value_t = 0)]
     pub seed: u32,
+    /// Render each frame as an instant, even if the camera has a shutter
+    #[arg(long)]
+    pub no_motion_blur: bool,
     /// Threads; as many as there are cores if not given
     #[arg(long, value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub threads: Option<u16>,
@@ -235,6 +238,7 @@ impl Arguments {
                 Strategy::Exhaustive => LightStrategy::Exhaustive,
                 Strategy::All => LightStrategy::All,
             },
+            motion_blur: !self.no_motion_blur,
             split: self.split.map_or(Split::Auto, Split::Fixed),
             max_lights: self.max_lights,
             split_by: match self.split_by {

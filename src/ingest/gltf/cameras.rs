@@ -6,7 +6,7 @@
 use super::document::{UsdCamera, reals};
 use super::{Output, Source};
 use crate::ingest::notes::Notes;
-use crate::scene::{Camera, Category, Projection};
+use crate::scene::{Camera, Category, Projection, Shutter};
 use gltf::json::{Camera as Row, Index, Node};
 use std::f32::consts::PI;
 
@@ -128,6 +128,12 @@ fn apply(usd: &UsdCamera, camera: &mut Camera, object: &str, notes: &mut Notes) 
                 object,
                 "its camera's clipping planes leave nothing between them; left out",
             );
+        }
+    }
+    if let Some([open, close]) = usd.shutter.map(reals) {
+        camera.shutter = Shutter::new(open.into(), close.into());
+        if camera.shutter.is_none() {
+            notes.add(CAMERAS, object, "its camera's shutter is never open; taken for an instant");
         }
     }
 }

@@ -32,6 +32,7 @@ pub(in crate::ingest::gltf) struct UsdCamera {
     pub exposure_scale: Option<Real>,
     #[serde(rename = "clippingRange_m")]
     pub clipping_range_m: Option<[Real; 2]>,
+    pub shutter: Option<[Real; 2]>,
 }
 
 /// `extras.usdLux`: the light at a node.
