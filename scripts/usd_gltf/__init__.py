@@ -27,7 +27,7 @@ A tour, in the order of the work:
 `shader_network`, `evaluator`, `quantities`, `network_images`   networks of shaders, and what they compute
 `shader_nodes`, `arnold_nodes`, `color_spaces`  nodes
 `materialx_layers`, `materialx_library`     `.mtlx` files, and MaterialX's own nodes
-`instancers`, `cameras`, `fog`, `transforms`, `animation`
+`instancers`, `cameras`, `shutters`, `fog`, `transforms`, `animation`
 `gltf_document`     buffers, accessors, JSON, files
 `report`            what had no carrier, by category
 
@@ -35,4 +35,4 @@ Matrices here multiply column vectors (the transpose of Gf's). Stage units and a
 nodes; one root node turns them into metres and +Y up.
 """
 
-EXPORTER = "candelabra usd_to_gltf 1.1"
+EXPORTER = "candelabra usd_to_gltf 1.2"

@@ -93,8 +93,9 @@ def _asset_extras(
         "metersPerUnit": number(meters_per_unit),
         "upAxis": up_axis,
         "timeCodesPerSecond": number(frames.codes_per_second),
-        "startTimeCode": number(frames.codes[0]),
-        "endTimeCode": number(frames.codes[-1]),
+        "startTimeCode": number(frames.first),
+        "endTimeCode": number(frames.numbers[-1]),
+        **({"zeroTimeCode": number(frames.zero)} if frames.zero != frames.first else {}),
         "normalizeArea": options.normalize_area,
         "sourceHash": fingerprint,
     }
