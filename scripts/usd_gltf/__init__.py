@@ -14,6 +14,7 @@ A tour, in the order of the work:
 `light_visibility`, `light_losses`, `vendors`   which rays see a light; what is lost of it
 `light_shapes`      tessellation and world-space areas of the intrinsic lights
 `light_carriers`    which glTF object carries which light
+`light_growth`      the radiance of normalized lights while they grow
 `linking`           which lights light what, and what casts their shadows
 `light_profiles`    the IES profiles of lights
 `light_textures`    the pictures of rect lights and domes

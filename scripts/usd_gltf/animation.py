@@ -16,7 +16,9 @@ from .transforms import continuous, slerp
 
 _WIDTHS = {"translation": 3, "rotation": 4, "scale": 3}
 _NOISE = 1e-6
-"""Single precision's, relative to the largest value of a track."""
+"""Single precision's, relative to the values that it is about."""
+_NOTHING = 1e-12
+"""The same where these are 0."""
 
 
 def varies(values: np.ndarray) -> bool:
@@ -42,19 +44,23 @@ def needed(frames: Frames, values: np.ndarray, turns: bool = False) -> np.ndarra
         shown *= np.where(np.einsum("ni,ni->n", shown, values) < 0, -1.0, 1.0)[:, None]
     else:
         shown = values[before] + share * (values[after] - values[before])
-    noise = _NOISE * np.abs(values).max()
+    size = np.abs(values).max(axis=1)
+    noise = _NOISE * np.maximum(size[before], size[after]) + _NOTHING
     kept |= np.isin(span, span[np.abs(shown - values).max(axis=1) > noise])
     # What comes before the first frame and after the last is held there.
     for end, inner in ((0, at[1]), (-1, at[-2])):
         held = values[: inner + 1] if end == 0 else values[inner:]
-        kept[end] |= np.abs(held - values[inner]).max() > noise
+        kept[end] |= np.abs(held - values[inner]).max() > noise[end]
     return np.flatnonzero(kept)
 
 
-def strength_keys(frames: Frames, rgb: np.ndarray) -> dict:
-    """`extras.usdLux.values`: strengths (n, 3), one for each time code of `frames`, over time."""
-    keys = needed(frames, rgb)
-    return {"times": numbers(frames.seconds[keys]), "rgb": [numbers(row) for row in rgb[keys]]}
+def strength_keys(frames: Frames, rgb: np.ndarray, between: dict[float, np.ndarray] | None = None) -> dict:
+    """`extras.usdLux.values`: strengths (n, 3), one for each time code of `frames`, and those at codes `between`."""
+    rows = {frames.codes[key]: rgb[key] for key in needed(frames, rgb)}
+    # The sampled ones are kept where 32 bits cannot tell times apart.
+    seconds = {np.float32(frames.seconds_at(code)): row for code, row in [*(between or {}).items(), *rows.items()]}
+    times = sorted(seconds)
+    return {"times": numbers(times), "rgb": [numbers(seconds[time]) for time in times]}
 
 
 def animate(document: Document, node: int, frames: Frames, tracks: dict[str, np.ndarray]) -> int:

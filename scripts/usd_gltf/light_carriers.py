@@ -21,6 +21,7 @@ import numpy as np
 
 from .animation import strength_keys
 from .gltf_document import Document, number, numbers
+from .light_growth import keys_of_growth
 from .light_inputs import SIZES, Light
 from .light_profiles import WITHOUT_CONE, LightProfiles
 from .light_shapes import Tessellation, tessellate, world_area
@@ -106,7 +107,8 @@ class LightCarriers:
             return
         if light.type == "SphereLight":
             extras["radius"] = number(light.size["radius"])
-        self._animated(extras, nits)
+        grown = keys_of_growth(self.frames, normalize, world, lambda linear: world_area(light.type, size, linear), nits)
+        self._animated(extras, nits, grown)
         material = self.materials.light_material(Emission(self._first(nits), texture, nits.ndim == 2))
         primitive = {**self._tessellated(light.type, size, texture is not None), "material": material}
         node["mesh"] = self.document.shared("meshes", {"name": light.type, "primitives": [primitive]})
@@ -187,7 +189,9 @@ class LightCarriers:
             mesh.report_still_glow(self.report)
         lit = mesh.lit_primitives(self.materials, light, rgb)
         if rgb.ndim == 2 and lit:
-            self._animated(extras, rgb * np.array(mesh.pieces_lit(light.material_sync)[0].glow))
+            grown = keys_of_growth(self.frames, light.normalize, world, mesh.area, rgb)
+            glow = np.array(mesh.pieces_lit(light.material_sync)[0].glow)
+            self._animated(extras, rgb * glow, {code: row * glow for code, row in grown.items()})
         node["mesh"] = self.document.shared("meshes", {"name": mesh.name, "primitives": lit})
 
     # -- lights without area ---------------------------------------------------------------------
@@ -247,10 +251,10 @@ class LightCarriers:
         """The first frame's of (times, 3)."""
         return rgb[self.frames.rest] if rgb.ndim == 2 else rgb
 
-    def _animated(self, extras: dict, rgb: np.ndarray) -> None:
-        """`extras.usdLux.values`, if the light varies."""
+    def _animated(self, extras: dict, rgb: np.ndarray, between: dict[float, np.ndarray] | None = None) -> None:
+        """`extras.usdLux.values`, if the light varies; `between` the time codes that are sampled too."""
         if rgb.ndim == 2:
-            extras["values"] = strength_keys(self.frames, rgb)
+            extras["values"] = strength_keys(self.frames, rgb, between)
 
 
 def _each_frame(world: np.ndarray, area) -> np.ndarray | float:

@@ -98,10 +98,14 @@ class Frames:
         sampled, since glTF has no times below 0."""
         return self.first - math.ceil(self.first - self.codes[0])
 
+    def seconds_at(self, codes) -> np.ndarray:
+        """glTF times of time codes: `(timeCode - zero) / timeCodesPerSecond`."""
+        return (np.array(codes) - self.zero) / self.codes_per_second
+
     @functools.cached_property
     def seconds(self) -> np.ndarray:
-        """glTF times of `codes`: `(timeCode - zero) / timeCodesPerSecond`."""
-        return (np.array(self.codes) - self.zero) / self.codes_per_second
+        """glTF times of `codes`."""
+        return self.seconds_at(self.codes)
 
 
 def first_line(error: Exception, path: Path) -> str:

@@ -266,6 +266,39 @@ def test_a_normalized_light_that_grows_keeps_its_power_within_the_shutter(gltf):
     assert nits * 4 * np.pi * radius**2 == pytest.approx(np.ones(len(codes)), rel=1e-4)
 
 
+GROWTH = {
+    "eightfold": ('{ 0: 1, 1: 1, 2: 8, 5: 8 }', 0.02),
+    "shrinks": ('{ 0: 9, 1: 9, 2: 0.5, 5: 0.5 }', 0.02),
+    "from nothing": ('{ 0: 0, 1: 0, 5: 4 }', 2.0),
+}
+
+
+@pytest.mark.parametrize("growth", GROWTH)
+@pytest.mark.parametrize("scale", ["(1, 1, 1)", "(1, 3, 0.5)"])
+def test_a_normalized_light_has_its_power_all_the_while_the_shutter_is_open(gltf, growth, scale):
+    """Straight lines between the radiance of two keys would give it up to any power in between."""
+    radii, tolerance = GROWTH[growth]
+    light = f"bool inputs:normalize.timeSamples = {{ 0: 1, 3: 0 }}\n float inputs:radius.timeSamples = {radii}"
+    scene = gltf(HEADER + camera(-0.5, 0.5) + f"""def Xform "Rig" {{
+        float3 xformOp:scale = {scale}
+        uniform token[] xformOpOrder = ["xformOp:scale"]
+        def SphereLight "L" {{ {light} }}
+    }}""")  # fmt: skip
+    values = scene.lux("/Rig/L")["values"]
+    assert (np.diff(np.float32(values["times"])) > 0).all()
+    codes, nits = np.array(values["times"]) * 24, np.array(values["rgb"])[:, 0]
+    corners = scene.triangles("/Rig/L")
+
+    def area(code):
+        shown = corners @ at(scene, "/Rig/L", code)[:3, :3].T
+        return np.linalg.norm(np.cross(shown[:, 1] - shown[:, 0], shown[:, 2] - shown[:, 0]), axis=1).sum() / 2
+
+    power = np.array([np.interp(code, codes, nits) * area(code) for code in np.linspace(0.5, 2.5, 401)])
+    assert power.min() > 0.99 and power.max() < 1.01 + tolerance
+    assert power.mean() == pytest.approx(1, abs=0.02)
+    assert np.interp([3, 3.5, 4.5], codes, nits) == pytest.approx([1] * 3, rel=1e-6), "not normalized any more"
+
+
 # -- time codes ------------------------------------------------------------------------------------
 
 
