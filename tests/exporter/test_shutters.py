@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from conftest import Gltf, local_matrix
+from conftest import ROOT, Gltf, local_matrix
 from pxr import Usd, UsdGeom
 from usd_gltf.stage import Frames
 from usd_gltf.transforms import slerp
@@ -297,6 +297,27 @@ def test_a_normalized_light_has_its_power_all_the_while_the_shutter_is_open(gltf
     assert power.min() > 0.99 and power.max() < 1.01 + tolerance
     assert power.mean() == pytest.approx(1, abs=0.02)
     assert np.interp([3, 3.5, 4.5], codes, nits) == pytest.approx([1] * 3, rel=1e-6), "not normalized any more"
+
+
+def test_the_scene_of_spinning_lamps_is_carried_whole(export):
+    result = export(ROOT / "scenes/spinning_lamps/spinning_lamps.usda")
+    scene, root = Gltf(result.path), "/World/"
+    assert result.warned() == set()
+    assert scene.node(f"{root}Camera")["extras"]["usdCamera"]["shutter"] == [-0.25, 0.25]
+    assert scene.json["asset"]["extras"]["usd"]["zeroTimeCode"] == 1000
+    values = scene.lux(f"{root}Balloon")["values"]
+    codes, nits = 1000 + np.array(values["times"]) * 24, np.array(values["rgb"])
+    for code in (1000.75, 1001, 1008.25, 1016, 1024):
+        # Its radius, and radiance over the area in square centimetres, the stage's unit.
+        radius = 3 + 37 * (code - 1000) / 24
+        shown = scene.lux(f"{root}Balloon")["radius"] * np.cbrt(np.linalg.det(at(scene, f"{root}Balloon", code)[:3, :3]))
+        assert shown == pytest.approx(radius / 100, rel=1e-5)
+        expected = 12000 * np.array([1, 0.3, 0.35]) / (4 * np.pi * radius**2)
+        assert [np.interp(code, codes, part) for part in nits.T] == pytest.approx(expected, rel=1e-3)
+        angle = np.radians((code - 1000) * 40)
+        bulb = at(scene, f"{root}Wheel/Bulbs[0]", code)[:3, 3]
+        # Z up becomes Y up.
+        assert bulb == pytest.approx([np.cos(angle) - 0.4, 1.5 - np.sin(angle), 0], abs=1e-4)
 
 
 # -- time codes ------------------------------------------------------------------------------------
