@@ -31,6 +31,7 @@ A tour, in the order of the work:
 `instancers`, `cameras`, `shutters`, `fog`, `transforms`, `animation`
 `gltf_document`     buffers, accessors, JSON, files
 `report`            what had no carrier, by category
+`progress`, `events`    how far it is, for people and for `candelabra`
 
 Matrices here multiply column vectors (the transpose of Gf's). Stage units and axes are kept in all
 nodes; one root node turns them into metres and +Y up.

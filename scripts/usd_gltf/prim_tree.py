@@ -21,6 +21,7 @@ from .fog import read_fog
 from .instancers import Placements, read_placements
 from .light_inputs import Light, light_type, read_light
 from .mesh import MeshReader, MeshSource
+from .progress import Progress
 from .report import Notebook
 from .stage import PREDICATE, PROTOTYPE_PREDICATE, Frames, changes
 from .transforms import between, column
@@ -66,8 +67,9 @@ class PrimTree:
         purposes: tuple[str, ...],
         meters_per_unit: float,
         report: Notebook,
+        progress: Progress,
     ) -> None:
-        self.stage, self.meshes, self.frames = stage, meshes, frames
+        self.stage, self.meshes, self.frames, self.progress = stage, meshes, frames, progress
         self.purposes, self.meters_per_unit, self.report = purposes, meters_per_unit, report
         self.lights = report.about("lights")
         self._prototypes: dict[str, Prim | None] = {}
@@ -76,6 +78,7 @@ class PrimTree:
         self._geometry_lights: dict[str, Usd.Prim] = {}
         self._lit_geometry: set[str] = set()
         for prim in Usd.PrimRange(stage.GetPseudoRoot(), PREDICATE):
+            progress.total += 1
             if prim.GetTypeName() == "GeometryLight":
                 light = UsdGeom.Imageable(prim)
                 if light.ComputeVisibility(frames.first) == UsdGeom.Tokens.invisible:
@@ -99,6 +102,7 @@ class PrimTree:
         if prim.IsA(UsdShade.Material) or prim.IsA(UsdShade.NodeGraph):
             return None
         path = prim.GetPath()
+        self.progress.read(str(path))
         shown = True
         if prim.IsA(UsdGeom.Imageable):
             imageable = UsdGeom.Imageable(prim)
