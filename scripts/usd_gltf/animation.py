@@ -1,7 +1,7 @@
 """What varies over time as keys, and only where something varies.
 
 Values are sampled at the time codes of `Frames.codes`: at each frame, and where a camera has a shutter, when it
-opens and closes. A frame between the first and the last change has a key. Other time codes have one only
+opens and closes, and at quarters of a frame in between. A frame between the first and the last change has a key. Other time codes have one only
 where what they show is not what is between their neighbours: authored samples between frames, turns of
 half a circle and more, motion before the first frame and after the last.
 """

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 from pxr import Usd, UsdGeom
 
 _LONGEST = 10_000.0
@@ -27,6 +28,18 @@ def is_interval(shutter: Shutter) -> bool:
     """Whether the shutter is open for some time, all of it within reason."""
     opens, closes = shutter
     return math.isfinite(opens) and math.isfinite(closes) and -_LONGEST <= opens < closes <= _LONGEST
+
+
+def open_codes(shutter: Shutter, frames: np.ndarray) -> np.ndarray:
+    """Time codes at which a shutter around each of some successive frames opens, closes, or is open at quarters
+    of a frame. (From key to key a rotation takes the short way: quarters tell turns of up to twice a frame.)"""
+    opens, closes = shutter
+    if closes - opens < 1:
+        quarters = np.arange(math.ceil(4 * opens), math.floor(4 * closes) + 1) / 4
+        return np.add.outer(frames, [opens, *quarters, closes]).reshape(-1)
+    length = frames[-1] - frames[0]
+    quarters = frames[0] + np.arange(math.ceil(4 * opens), math.floor(4 * (length + closes)) + 1) / 4
+    return np.concatenate([frames + opens, quarters, frames + closes])
 
 
 def stage_shutters(prims: Usd.PrimRange, code: float) -> tuple[Shutter, ...]:

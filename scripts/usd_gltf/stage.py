@@ -14,7 +14,7 @@ from pxr import Sdf, Tf, Usd, UsdGeom
 
 from .composition import report_composition
 from .report import ExportError, Notebook
-from .shutters import Shutter, stage_shutters
+from .shutters import Shutter, open_codes, stage_shutters
 
 if TYPE_CHECKING:
     from .materialx_layers import Documents
@@ -62,14 +62,9 @@ class Frames:
 
     @functools.cached_property
     def codes(self) -> tuple[float, ...]:
-        """All time codes to sample, ascending: the frames; when shutters open and close around each of
-        them; and whole frames before the first and after the last while a shutter is open."""
+        """All time codes to sample, ascending: the frames, and those at which shutters are open around them."""
         numbers = np.array(self.numbers)
-        wanted = {float(code) for shutter in self.shutters for end in shutter for code in numbers + end}
-        if wanted:
-            before, after = numbers[0] - min(wanted), max(wanted) - numbers[-1]
-            wanted |= {numbers[0] - step for step in range(1, math.floor(max(before, 0)) + 1)}
-            wanted |= {numbers[-1] + step for step in range(1, math.floor(max(after, 0)) + 1)}
+        wanted = {code for shutter in self.shutters for code in open_codes(shutter, numbers).tolist()}
         # Times are stored in 32 bits, and must ascend there too.
         apart = max(_APART, (len(numbers) + len(wanted)) * 2.0**-22)
         kept: list[tuple[float, bool]] = []
