@@ -8,7 +8,7 @@ import numpy as np
 from pxr import Usd, UsdGeom
 
 _LONGEST = 10_000.0
-"""Frames. What is open longer is taken for an error: each frame of it would be sampled."""
+"""Frames before or after its own. What reaches further is taken for an error: each frame of it would be sampled."""
 
 Shutter = tuple[float, float]
 """Time codes relative to the frame: when it opens and when it closes."""
