@@ -14,6 +14,7 @@ A tour, in the order of the work:
 `light_visibility`, `light_losses`, `vendors`   which rays see a light; what is lost of it
 `light_shapes`      tessellation and world-space areas of the intrinsic lights
 `light_carriers`    which glTF object carries which light
+`light_growth`      the radiance of normalized lights while they grow
 `linking`           which lights light what, and what casts their shadows
 `light_profiles`    the IES profiles of lights
 `light_textures`    the pictures of rect lights and domes
@@ -27,12 +28,13 @@ A tour, in the order of the work:
 `shader_network`, `evaluator`, `quantities`, `network_images`   networks of shaders, and what they compute
 `shader_nodes`, `arnold_nodes`, `color_spaces`  nodes
 `materialx_layers`, `materialx_library`     `.mtlx` files, and MaterialX's own nodes
-`instancers`, `cameras`, `fog`, `transforms`, `animation`
+`instancers`, `cameras`, `shutters`, `fog`, `transforms`, `animation`
 `gltf_document`     buffers, accessors, JSON, files
 `report`            what had no carrier, by category
+`progress`, `events`    how far it is, for people and for `candelabra`
 
 Matrices here multiply column vectors (the transpose of Gf's). Stage units and axes are kept in all
 nodes; one root node turns them into metres and +Y up.
 """
 
-EXPORTER = "candelabra usd_to_gltf 1.1"
+EXPORTER = "candelabra usd_to_gltf 1.2"

@@ -12,6 +12,7 @@ from pxr import Usd, UsdGeom
 
 from .gltf_document import number, numbers
 from .report import Notebook
+from .shutters import authored_shutter, is_interval
 from .stage import Frames, changes
 from .vendors import report_others
 
@@ -19,7 +20,7 @@ _TENTH = 0.1
 _READ = (
     "projection", "horizontalAperture", "verticalAperture", "horizontalApertureOffset",
     "verticalApertureOffset", "focalLength", "fStop", "focusDistance", "clippingRange", "exposure",
-    "exposure:iso", "exposure:time", "exposure:fStop", "exposure:responsivity",
+    "exposure:iso", "exposure:time", "exposure:fStop", "exposure:responsivity", "shutter:open", "shutter:close",
 )  # fmt: skip
 _DEFAULT_RANGE = (1.0, 1e6)
 """UsdGeomCamera's fallback, which is not what anybody chose to see."""
@@ -65,6 +66,12 @@ def read_camera(
         report.warn(path, "camera exposure is no factor", f"its attributes give {exposure:g}; 1 is used")
     elif number(exposure) != 1.0:
         extras["exposureScale"] = number(exposure)
+    shutter = authored_shutter(camera, frames.first)
+    if shutter is not None and is_interval(shutter):
+        extras["shutter"] = numbers(shutter)
+    elif shutter is not None and shutter[0] != shutter[1]:
+        why = f"it opens at {shutter[0]:g} and closes at {shutter[1]:g}; nothing is blurred by it"
+        report.warn(path, "camera shutter is no interval", why)
     _report_losses(camera, frames, report)
     report.count("cameras")
     znear, zfar = number(max(near * meters_per_unit, 0.0)), number(min(far * meters_per_unit, _LARGEST))
@@ -100,14 +107,6 @@ def _report_losses(camera: UsdGeom.Camera, frames: Frames, report: Notebook) -> 
     planes = camera.GetClippingPlanesAttr().Get(frames.first)
     if planes:
         report.warn(path, "clippingPlanes", f"{len(planes)} planes have no carrier; nothing is cut by them")
-    opens = camera.GetShutterOpenAttr().Get(frames.first) or 0.0
-    closes = camera.GetShutterCloseAttr().Get(frames.first) or 0.0
-    if opens != closes:
-        why = f"it is open from {opens:g} to {closes:g}; motion blur has no carrier"
-        stage = prim.GetStage()
-        moves = len(frames.codes) > 1 or stage.GetEndTimeCode() > stage.GetStartTimeCode()
-        line = report.warn if moves else report.note
-        line(path, "camera shutter", why if moves else f"{why}, and the stage has one frame")
     if camera.GetStereoRoleAttr().Get(frames.first) not in (None, UsdGeom.Tokens.mono):
         report.note(path, "camera stereoRole", "each camera is carried by itself")
     report_others(prim, set(), frames.first, report)

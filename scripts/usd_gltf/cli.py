@@ -17,6 +17,7 @@ from pxr import Sdf, Tf, UsdUtils
 from .events import tell_up_to_date
 from .export import export
 from .whole_file import write_atomically
+from .progress import FORMS, Progress, form_of_environment
 from .report import CATEGORIES, ExportError
 from .source_hash import recorded_hash, up_to_date
 from .stage import Options, first_line
@@ -77,6 +78,8 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--strict", type=_categories, default=(), metavar="[=LIST]",
                         help="fail if anything was lost or changed; --strict=LIST looks only at some categories, "
                         f"of {','.join(CATEGORIES)}")  # fmt: skip
+    parser.add_argument("--progress", choices=FORMS, help="how progress is shown: auto (a line on a terminal), json "
+                        "(events on standard output), none (default: CANDELABRA_PROGRESS, else auto)")  # fmt: skip
     parser.add_argument("--report", type=Path, metavar="FILE", help="where the report goes (default: OUT.report.json)")
     return parser
 
@@ -157,7 +160,9 @@ def _run(arguments: argparse.Namespace) -> int:
         tell_up_to_date(output)
         return 0
 
-    exported = export(source, output, options)
+    progress = Progress(arguments.progress or form_of_environment())
+    with progress:
+        exported = export(source, output, options, progress)
     diagnostics.TakeUncoalescedDiagnostics()
     report = exported.report
     for line in report.summary():
@@ -170,7 +175,9 @@ def _run(arguments: argparse.Namespace) -> int:
         strict = "--strict" if arguments.strict == CATEGORIES else f"--strict={','.join(arguments.strict)}"
         why = f"{count} warning{'s' * (count != 1)} under {strict}; nothing was written (see {report_path})"
         raise ExportError(f"{source}: {why}")
-    exported.document.write(exported.usd)
+    with progress:
+        progress.stage("writing")
+        exported.document.write(exported.usd)
     _write_report(report_path, text)
     counts = ", ".join(f"{number} {what}" for what, number in sorted(report.counts.items()))
     if report.notes:

@@ -13,7 +13,11 @@ from pathlib import Path
 def tell_up_to_date(output: Path) -> None:
     """Say that an output was made of the same before, and is kept."""
     if os.environ.get("CANDELABRA_PROGRESS") == "json":
-        event = {"event": "up-to-date", "frame": None, "output": str(output)}
-        print(json.dumps(event, separators=(",", ":")))
+        tell({"event": "up-to-date", "frame": None, "output": str(output)})
     else:
         print(f"{output}: up to date")
+
+
+def tell(event: dict) -> None:
+    """Print an event."""
+    print(json.dumps(event, separators=(",", ":")), flush=True)

@@ -19,6 +19,7 @@ from .materialx_layers import Documents
 from .mesh import MeshReader
 from .node_writer import NodeWriter, root_node
 from .prim_tree import PrimTree
+from .progress import Progress
 from .report import Report
 from .skinning import Skinning
 from .source_hash import Dependencies
@@ -38,8 +39,9 @@ class Exported:
     dependencies: dict[str, str]
 
 
-def export(source: Path, output: Path, options: Options) -> Exported:
+def export(source: Path, output: Path, options: Options, progress: Progress) -> Exported:
     """Compile `source` into a document; nothing is written yet."""
+    progress.stage("opening the stage")
     report = Report()
     other = report.about("other")
     dependencies = Dependencies(source)
@@ -59,7 +61,7 @@ def export(source: Path, output: Path, options: Options) -> Exported:
     skinning = Skinning(stage, frames, report.about("geometry"))
     meshes = MeshReader(document, materials, skinning, frames, options.complexity, report.about("geometry"))
     meshes.link_subsets = LinkSubsets(stage, report.about("lights"))
-    tree = PrimTree(stage, meshes, frames, options.purposes, meters_per_unit, report.about("geometry"))
+    tree = PrimTree(stage, meshes, frames, options.purposes, meters_per_unit, report.about("geometry"), progress)
     pictures = LightTextures(document, dependencies, frames, report.about("lights"))
     profiles = LightProfiles(document, dependencies, frames, report.about("lights"))
     carriers = LightCarriers(
@@ -72,7 +74,9 @@ def export(source: Path, output: Path, options: Options) -> Exported:
         options.normalize_area,
         report.about("lights"),
     )
+    progress.stage("reading prims")
     prims = tree.roots()
+    progress.stage("making nodes")
     linking = Linking(stage, prims, report.about("lights"))
     writer = NodeWriter(document, materials, carriers, linking, frames, report.about("animation"))
     writer.write(prims, root_node(meters_per_unit, up_axis == UsdGeom.Tokens.z))
@@ -93,8 +97,9 @@ def _asset_extras(
         "metersPerUnit": number(meters_per_unit),
         "upAxis": up_axis,
         "timeCodesPerSecond": number(frames.codes_per_second),
-        "startTimeCode": number(frames.codes[0]),
-        "endTimeCode": number(frames.codes[-1]),
+        "startTimeCode": number(frames.first),
+        "endTimeCode": number(frames.numbers[-1]),
+        **({"zeroTimeCode": number(frames.zero)} if frames.zero != frames.first else {}),
         "normalizeArea": options.normalize_area,
         "sourceHash": fingerprint,
     }

@@ -19,21 +19,21 @@ class Placements:
 
     numbers: np.ndarray
     matrices: np.ndarray
-    """(n, 4, 4), or (frames, n, 4, 4) if the instancer moves; without the prototype's own matrix."""
+    """(n, 4, 4), or (times, n, 4, 4) if the instancer moves; without the prototype's own matrix."""
 
 
 def read_placements(prim: Usd.Prim, frames: Frames, report: Notebook) -> dict[int, Placements]:
     """Placements of each prototype, by its index in `prototypes`."""
     instancer = UsdGeom.PointInstancer(prim)
     path = prim.GetPath()
-    states = [_state(instancer, code) for code in frames.codes[: len(frames.codes) if _moves(instancer) else 1]]
-    matrices, prototypes, shown = states[0]
+    matrices, prototypes, shown = _state(instancer, frames.first)
     if len(prototypes) == 0:
         return {}
     if len(matrices) != len(prototypes):
         why = "positions, orientations, scales and protoIndices have different lengths"
         report.warn(path, "PointInstancer without usable instances", why)
         return {}
+    states = [_state(instancer, code) for code in frames.codes] if _moves(instancer) else []
     if len(states) > 1:
         if all(len(m) == len(matrices) and np.array_equal(p, prototypes) and np.array_equal(s, shown)
                for m, p, s in states):  # fmt: skip

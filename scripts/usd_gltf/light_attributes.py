@@ -110,7 +110,7 @@ class LightAttributes:
         attribute = self._found[name]
         if not attribute:
             return None
-        codes = self.frames.codes if attribute.ValueMightBeTimeVarying() else self.frames.codes[:1]
+        codes = self.frames.codes if attribute.ValueMightBeTimeVarying() else (self.frames.first,)
         values = (attribute.Get(code) for code in codes)
         return attribute if any(isinstance(v, Sdf.AssetPath) and v.path for v in values) else None
 

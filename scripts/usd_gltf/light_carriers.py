@@ -19,7 +19,9 @@ import math
 
 import numpy as np
 
+from .animation import strength_keys
 from .gltf_document import Document, number, numbers
+from .light_growth import keys_of_growth
 from .light_inputs import SIZES, Light
 from .light_profiles import WITHOUT_CONE, LightProfiles
 from .light_shapes import Tessellation, tessellate, world_area
@@ -105,8 +107,9 @@ class LightCarriers:
             return
         if light.type == "SphereLight":
             extras["radius"] = number(light.size["radius"])
-        self._animated(extras, nits)
-        material = self.materials.light_material(Emission(_first(nits), texture, nits.ndim == 2))
+        grown = keys_of_growth(self.frames, normalize, world, lambda linear: world_area(light.type, size, linear), nits)
+        self._animated(extras, nits, grown)
+        material = self.materials.light_material(Emission(self._first(nits), texture, nits.ndim == 2))
         primitive = {**self._tessellated(light.type, size, texture is not None), "material": material}
         node["mesh"] = self.document.shared("meshes", {"name": light.type, "primitives": [primitive]})
 
@@ -181,12 +184,14 @@ class LightCarriers:
         if rgb.ndim == 2 and len({piece.glow for piece in mesh.pieces_lit(light.material_sync)}) > 1:
             why = "its parts glow differently; the first frame's values are used"
             self.report.warn(light.path, "animated light on a mesh of several materials", why)
-            rgb = rgb[0]
+            rgb = self._first(rgb)
         if light.material_sync == GLOW:
             mesh.report_still_glow(self.report)
         lit = mesh.lit_primitives(self.materials, light, rgb)
         if rgb.ndim == 2 and lit:
-            self._animated(extras, rgb * np.array(mesh.pieces_lit(light.material_sync)[0].glow))
+            grown = keys_of_growth(self.frames, light.normalize, world, mesh.area, rgb)
+            glow = np.array(mesh.pieces_lit(light.material_sync)[0].glow)
+            self._animated(extras, rgb * glow, {code: row * glow for code, row in grown.items()})
         node["mesh"] = self.document.shared("meshes", {"name": mesh.name, "primitives": lit})
 
     # -- lights without area ---------------------------------------------------------------------
@@ -197,7 +202,7 @@ class LightCarriers:
         self._animated(extras, candela)
         shaping = extras.get("shaping")
         if shaping is None:
-            self._khr_light(node, "point", _first(candela))
+            self._khr_light(node, "point", self._first(candela))
             return
         outer = math.radians(min(shaping["coneAngle"], 90.0))
         if outer <= 0.0:
@@ -205,18 +210,18 @@ class LightCarriers:
             return
         inner = min(math.radians(shaping["coneAngle"] * (1 - shaping["coneSoftness"])), outer * 0.9999)
         spot = {"innerConeAngle": number(inner), "outerConeAngle": min(number(outer), math.pi / 2)}
-        self._khr_light(node, "spot", _first(candela), spot)
+        self._khr_light(node, "spot", self._first(candela), spot)
 
     def _distant(self, light: Light, node: dict, extras: dict) -> None:
         """Lux on a surface that faces it; the angle of the first frame, the lux of every frame."""
         facing = np.vectorize(_facing)(light.angle_deg, light.normalize)
         lux = _settled(_times(light.rgb, facing))
-        extras["angle"] = number(light.angle_deg.flat[0])
+        extras["angle"] = number(light.angle_deg[self.frames.rest] if light.angle_deg.ndim else light.angle_deg)
         if light.angle_deg.ndim:
             why = "the first frame's is kept; every frame has its own illuminance"
             self.report.warn(light.path, "animated inputs:angle", why)
         self._animated(extras, lux)
-        self._khr_light(node, "directional", _first(lux))
+        self._khr_light(node, "directional", self._first(lux))
         if extras.pop("shaping", None) is not None:
             self.report.warn(light.path, "shaping of a DistantLight", "it has no position to be shaped from")
 
@@ -227,7 +232,7 @@ class LightCarriers:
             rgb = _settled(self._writable(light, rgb * factor))
             if uri is not None:
                 extras["texture"] = uri
-        extras["radiance"] = numbers(_first(rgb))
+        extras["radiance"] = numbers(self._first(rgb))
         self._animated(extras, rgb)
         if extras.pop("shaping", None) is not None:
             self.report.warn(light.path, "shaping of a DomeLight", "it has no position to be shaped from")
@@ -242,13 +247,14 @@ class LightCarriers:
         extension = self.document.use("KHR_lights_punctual")
         node["extensions"] = {extension: {"light": index}}
 
-    def _animated(self, extras: dict, rgb: np.ndarray) -> None:
-        """`extras.usdLux.values`, if the light varies."""
+    def _first(self, rgb: np.ndarray) -> np.ndarray:
+        """The first frame's of (times, 3)."""
+        return rgb[self.frames.rest] if rgb.ndim == 2 else rgb
+
+    def _animated(self, extras: dict, rgb: np.ndarray, between: dict[float, np.ndarray] | None = None) -> None:
+        """`extras.usdLux.values`, if the light varies; `between` the time codes that are sampled too."""
         if rgb.ndim == 2:
-            extras["values"] = {
-                "times": numbers(self.frames.seconds),
-                "rgb": [numbers(row) for row in rgb],
-            }
+            extras["values"] = strength_keys(self.frames, rgb, between)
 
 
 def _each_frame(world: np.ndarray, area) -> np.ndarray | float:
@@ -283,7 +289,3 @@ def _times(rgb: np.ndarray, factor) -> np.ndarray:
 def _settled(rgb: np.ndarray) -> np.ndarray:
     """One row for (frames, 3) whose rows differ by no more than single precision's noise."""
     return rgb[0] if rgb.ndim == 2 and np.allclose(rgb, rgb[0], rtol=1e-6, atol=0) else rgb
-
-
-def _first(rgb: np.ndarray) -> np.ndarray:
-    return rgb[0] if rgb.ndim == 2 else rgb

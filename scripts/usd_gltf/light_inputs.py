@@ -163,10 +163,10 @@ def _measure(light: Light, inputs: LightAttributes) -> None:
 
 
 def _codes(inputs: LightAttributes, *names: str) -> tuple[float, ...]:
-    """All frames if one of the inputs may vary, else the first."""
+    """All time codes if one of the inputs may vary, else the first frame."""
     attributes = (inputs.attribute(name) for name in names)
     varying = any(attribute and attribute.ValueMightBeTimeVarying() for attribute in attributes)
-    return inputs.frames.codes if varying else inputs.frames.codes[:1]
+    return inputs.frames.codes if varying else (inputs.frames.first,)
 
 
 def _track(values: list) -> np.ndarray:

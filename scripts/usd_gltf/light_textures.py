@@ -87,7 +87,7 @@ class LightTextures:
             self.report.warn(light.path, "UDIM texture on a light", why)
             return None
         varying = attribute.ValueMightBeTimeVarying()
-        codes = self.frames.codes if varying else self.frames.codes[:1]
+        codes = self.frames.codes if varying else (self.frames.first,)
         files: dict[str, AssetFile | None] = {}
         names = []
         for code in codes:
@@ -110,7 +110,8 @@ class LightTextures:
                     means[name] = _mean(pictures.decode(file.data), dome)
             except PictureError as error:
                 self._unreadable(light, file.name, error)
-        kept = max(files, key=lambda name: (name == names[0] and means[name].all(), means[name].min(), name))
+        first = names[self.frames.rest] if len(names) > 1 else names[0]
+        kept = max(files, key=lambda name: (name == first and means[name].all(), means[name].min(), name))
         file = files[kept]
         shown = None if file is None else self._carried(light, file, dome)
         if shown is None:

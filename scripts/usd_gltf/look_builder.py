@@ -6,6 +6,7 @@ Values come under the names of UsdPreviewSurface, whatever shader they are of, w
 
 from __future__ import annotations
 
+import functools
 import math
 from dataclasses import dataclass
 
@@ -35,8 +36,8 @@ class Value:
     primvar: str = "displayColor"
     """Which primvar that colour is, times `primvar_scale`; `constant` on meshes without it."""
     primvar_scale: tuple[float, float, float] = (1.0, 1.0, 1.0)
-    varies: bool = False
-    """Whether `constant` is a list of one value for each frame."""
+    keys: list | None = None
+    """One constant for each time code that is sampled, if it varies."""
 
 
 class LookBuilder:
@@ -129,10 +130,10 @@ class LookBuilder:
         emissive = read["emissiveColor"]
         texture = emissive.texture
         if texture is None:
-            keys = emissive.constant if emissive.varies else [emissive.constant]
-            rows = [color_of(Value(key), (0.0, 0.0, 0.0), limit=math.inf) for key in keys]
-            look.emission = rows[0]
-            look.emission_keys = np.array(rows) if emissive.varies else None
+            nits = functools.partial(color_of, fallback=(0.0, 0.0, 0.0), limit=math.inf)
+            look.emission = nits(emissive)
+            if emissive.keys is not None:
+                look.emission_keys = np.array([nits(Value(key)) for key in emissive.keys])
             return
         if texture.is_plain("rgb", srgb=True) and min(texture.scale[:3]) >= 0 and "black" not in texture.wraps:
             image = self.textures.plain(texture)

@@ -177,7 +177,7 @@ class _Inputs(Inputs):
                 )
                 return self.value("emissiveColor", quantity)
             rows.append(tuple(read.constant))
-        return Value(rows, varies=True)
+        return Value(rows[self.surfaces.frames.rest], keys=rows)
 
     def _value(self, name: str, quantity: Quantity) -> Value:
         if quantity.is_constant:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .animation import animate, varies
+from .animation import animate, strength_keys, varies
 from .gltf_document import Document, numbers
 from .instancers import Placements
 from .light_carriers import LightCarriers
@@ -87,7 +87,7 @@ class NodeWriter:
             node["mesh"] = self._mesh(mesh)
             keys = prim.mesh.glow_keys()
             if keys is not None:
-                values = {"times": numbers(self.frames.seconds), "rgb": [numbers(row) for row in keys]}
+                values = strength_keys(self.frames, keys)
                 node["extras"]["usdLux"] = {"type": "MeshLight", "inputs": {}, "values": values}
             else:
                 prim.mesh.report_still_glow(self.report.about("lights"))
@@ -136,7 +136,7 @@ class NodeWriter:
         return node, self.document.node({"name": f"{name}_shear", "children": [index], **outside})
 
     def _moving(self, path: str, name: str, local: np.ndarray) -> tuple[dict, int]:
-        """A node that follows `local` (frames, 4, 4), and the index of the node to hang under the
+        """A node that follows `local` (times, 4, 4), and the index of the node to hang under the
         parent. Shear takes two nodes, and is exact at every frame."""
         sheared = decompose(local)[3].max() > SHEAR_TOLERANCE
         outside, inside = split_shear(local) if sheared else (None, local)
@@ -149,13 +149,13 @@ class NodeWriter:
     def _following(self, node: dict, local: np.ndarray) -> int:
         """Index of `node`, made to follow matrices without shear."""
         translation, rotation, scale, _ = decompose(local)
-        node.update(_place(translation[0], rotation[0], scale[0]))
+        node.update(_place(*(part[self.frames.rest] for part in (translation, rotation, scale))))
         index = self.document.node(node)
         tracks = {"translation": translation, "rotation": rotation, "scale": scale}
         for key, values in tracks.items():
             if varies(values):
                 node.setdefault(key, list(_DEFAULTS[key]))
-        self.report.count("animation channels", animate(self.document, index, self.frames.seconds, tracks))
+        self.report.count("animation channels", animate(self.document, index, self.frames, tracks))
         return index
 
 

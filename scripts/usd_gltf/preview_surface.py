@@ -59,7 +59,7 @@ class PreviewSurfaces:
         attribute = attributes[0]
         if not UsdShade.Output.IsOutput(attribute):
             if changes(attribute, self.frames) and name == "emissiveColor":
-                return Value([attribute.Get(code) for code in self.frames.codes], varies=True)
+                return Value(attribute.Get(self.code), keys=[attribute.Get(code) for code in self.frames.codes])
             if changes(attribute, self.frames):
                 report.warn(path, f"animated {name}", "materials have no animation; the first frame is used")
             return Value(constant=attribute.Get(self.code))

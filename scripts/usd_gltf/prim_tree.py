@@ -7,6 +7,9 @@ ask for it.
 
 from __future__ import annotations
 
+import bisect
+import functools
+import math
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -18,9 +21,10 @@ from .fog import read_fog
 from .instancers import Placements, read_placements
 from .light_inputs import Light, light_type, read_light
 from .mesh import MeshReader, MeshSource
+from .progress import Progress
 from .report import Notebook
 from .stage import PREDICATE, PROTOTYPE_PREDICATE, Frames, changes
-from .transforms import column
+from .transforms import between, column
 
 _POLE_Z = np.array([[1, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]], dtype=float)
 """DomeLight_1 with its pole along Z: local +Y goes to +Z, +Z to -Y (usdLux/schema.usda)."""
@@ -33,7 +37,7 @@ class Prim:
     path: str
     name: str
     local: np.ndarray
-    """(4, 4), or (frames, 4, 4) if it moves."""
+    """(4, 4), or (times, 4, 4) if it moves: one for each of `Frames.codes`."""
     resets: bool = False
     mesh: MeshSource | None = None
     light: Light | None = None
@@ -63,8 +67,9 @@ class PrimTree:
         purposes: tuple[str, ...],
         meters_per_unit: float,
         report: Notebook,
+        progress: Progress,
     ) -> None:
-        self.stage, self.meshes, self.frames = stage, meshes, frames
+        self.stage, self.meshes, self.frames, self.progress = stage, meshes, frames, progress
         self.purposes, self.meters_per_unit, self.report = purposes, meters_per_unit, report
         self.lights = report.about("lights")
         self._prototypes: dict[str, Prim | None] = {}
@@ -73,6 +78,7 @@ class PrimTree:
         self._geometry_lights: dict[str, Usd.Prim] = {}
         self._lit_geometry: set[str] = set()
         for prim in Usd.PrimRange(stage.GetPseudoRoot(), PREDICATE):
+            progress.total += 1
             if prim.GetTypeName() == "GeometryLight":
                 light = UsdGeom.Imageable(prim)
                 if light.ComputeVisibility(frames.first) == UsdGeom.Tokens.invisible:
@@ -96,6 +102,7 @@ class PrimTree:
         if prim.IsA(UsdShade.Material) or prim.IsA(UsdShade.NodeGraph):
             return None
         path = prim.GetPath()
+        self.progress.read(str(path))
         shown = True
         if prim.IsA(UsdGeom.Imageable):
             imageable = UsdGeom.Imageable(prim)
@@ -146,8 +153,7 @@ class PrimTree:
         xformable = UsdGeom.Xformable(prim)
         resets = xformable.GetResetXformStack()
         if xformable.TransformMightBeTimeVarying() and len(self.frames.codes) > 1:
-            stack = [xformable.GetLocalTransformation(code) for code in self.frames.codes]
-            matrices = column(np.array([np.array(m) for m in stack]))
+            matrices = _over_time(xformable, self.frames)
             if not np.array_equal(matrices.max(axis=0), matrices.min(axis=0)):
                 return matrices, resets
             return matrices[0], resets
@@ -220,6 +226,36 @@ class PrimTree:
             self._prototypes[target] = self._compile(prim, None, PROTOTYPE_PREDICATE)
             self._open.discard(target)
         return self._prototypes[target]
+
+
+def _over_time(xformable: UsdGeom.Xformable, frames: Frames) -> np.ndarray:
+    """Local matrices (times, 4, 4).
+
+    USD interpolates a sampled matrix by its numbers, which shrinks what turns. So time codes that are no frames lie
+    between their neighbours among frames and authored samples, as `between` goes.
+    """
+
+    @functools.cache
+    def at(code: float) -> np.ndarray:
+        return column(xformable.GetLocalTransformation(code))
+
+    ops = xformable.GetOrderedXformOps()
+    if frames.is_number.all() or not any(op.GetOpType() == UsdGeom.XformOp.TypeTransform and op.MightBeTimeVarying() for op in ops):
+        return np.array([at(code) for code in frames.codes])
+    samples = xformable.GetTimeSamples()
+    low, high = [], []
+    for code, is_number in zip(frames.codes, frames.is_number, strict=True):
+        whole = code if is_number else frames.first + math.floor(code - frames.first)
+        upto, since = bisect.bisect_right(samples, code), bisect.bisect_left(samples, code)
+        low.append(max([whole, *samples[max(upto - 1, 0) : upto]]))
+        high.append(min([code if is_number else whole + 1, *samples[since : since + 1]]))
+    low, high = np.array(low), np.array(high)
+    span = high - low
+    share = np.where(span > 0, (np.array(frames.codes) - low) / np.where(span > 0, span, 1.0), 0.0)
+    found, end = np.array([at(code) for code in low]), np.array([at(code) for code in high])
+    inside = share > 0
+    found[inside] = between(found[inside], end[inside], share[inside])
+    return found
 
 
 def _insert(compiled: Prim, matrix: np.ndarray) -> None:

@@ -123,7 +123,7 @@ class Skinning:
             return points, normals
         try:
             posed = self._posed(binding, points, corners, normals, code)
-            if any(self._moved(binding, later) for later in self.frames.codes[1:]):
+            if any(self._moved(binding, other) for other in self.frames.codes):
                 why = f"deforming meshes have no carrier; the pose of frame {code:g} is used"
                 self.report.about("animation").warn(path, "skinned mesh that deforms", why)
         except (ValueError, np.linalg.LinAlgError) as error:

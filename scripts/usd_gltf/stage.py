@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 import re
 from dataclasses import dataclass
@@ -13,6 +14,7 @@ from pxr import Sdf, Tf, Usd, UsdGeom
 
 from .composition import report_composition
 from .report import ExportError, Notebook
+from .shutters import Shutter, open_codes, stage_shutters
 
 if TYPE_CHECKING:
     from .materialx_layers import Documents
@@ -27,6 +29,8 @@ PROTOTYPE_PREDICATE = Usd.TraverseInstanceProxies(Usd.PrimIsActive & Usd.PrimIsL
 
 
 _NAMES_SHOWN = 20
+_APART = 1e-3
+"""Time codes that are nearer to each other count as one."""
 _EVERYTHING = Usd.TraverseInstanceProxies(Usd.PrimAllPrimsPredicate)
 
 
@@ -44,20 +48,59 @@ class Options:
 
 @dataclass(frozen=True)
 class Frames:
-    """The time codes that are exported, one key each."""
+    """The frames that are exported, and the time codes that are sampled for them."""
 
-    codes: tuple[float, ...]
+    numbers: tuple[float, ...]
+    """The time codes of the frames, ascending."""
     codes_per_second: float
+    shutters: tuple[Shutter, ...] = ()
 
     @property
     def first(self) -> float:
         """The frame that static values are read at."""
-        return self.codes[0]
+        return self.numbers[0]
+
+    @functools.cached_property
+    def codes(self) -> tuple[float, ...]:
+        """All time codes to sample, ascending: the frames, and those at which shutters are open around them."""
+        numbers = np.array(self.numbers)
+        wanted = {code for shutter in self.shutters for code in open_codes(shutter, numbers).tolist()}
+        # Times are stored in 32 bits, and must ascend there too.
+        apart = max(_APART, (len(numbers) + len(wanted)) * 2.0**-22)
+        kept: list[tuple[float, bool]] = []
+        for code, is_number in sorted([*((code, True) for code in self.numbers), *((code, False) for code in wanted)]):
+            if kept and code - kept[-1][0] < apart:
+                if not is_number:
+                    continue
+                if not kept[-1][1]:
+                    kept.pop()
+            kept.append((code, is_number))
+        return tuple(code for code, _ in kept)
+
+    @functools.cached_property
+    def rest(self) -> int:
+        """Which of `codes` is the first frame."""
+        return self.codes.index(self.first)
+
+    @functools.cached_property
+    def is_number(self) -> np.ndarray:
+        """Which of `codes` are frames."""
+        return np.isin(self.codes, self.numbers)
 
     @property
+    def zero(self) -> float:
+        """The time code at second 0 of the file: the first frame, or as many whole frames before it as are
+        sampled, since glTF has no times below 0."""
+        return self.first - math.ceil(self.first - self.codes[0])
+
+    def seconds_at(self, codes) -> np.ndarray:
+        """glTF times of time codes: `(timeCode - zero) / timeCodesPerSecond`."""
+        return (np.array(codes) - self.zero) / self.codes_per_second
+
+    @functools.cached_property
     def seconds(self) -> np.ndarray:
-        """glTF times: `(timeCode - startTimeCode) / timeCodesPerSecond`."""
-        return (np.array(self.codes) - self.codes[0]) / self.codes_per_second
+        """glTF times of `codes`."""
+        return self.seconds_at(self.codes)
 
 
 def first_line(error: Exception, path: Path) -> str:
@@ -70,11 +113,11 @@ def first_line(error: Exception, path: Path) -> str:
 
 
 def changes(attribute: Usd.Attribute, frames: Frames) -> bool:
-    """Whether the attribute's value differs between two of the frames."""
+    """Whether the attribute's value differs between two of the time codes that are sampled."""
     if not attribute or not attribute.ValueMightBeTimeVarying() or len(frames.codes) < 2:
         return False
     first = attribute.Get(frames.first)
-    return any(attribute.Get(code) != first for code in frames.codes[1:])
+    return any(attribute.Get(code) != first for code in frames.codes)
 
 
 def open_stage(path: Path, options: Options, documents: Documents, report: Notebook) -> Usd.Stage:
@@ -142,7 +185,8 @@ def _select_variant(stage: Usd.Stage, file: Path, prim_path: str, name: str, sel
 
 
 def choose_frames(stage: Usd.Stage, options: Options, report: Notebook) -> Frames:
-    """The frames asked for, else the stage's own range, else the range of its time samples."""
+    """The frames asked for, else the stage's own range, else the range of its time samples; and the shutters of
+    the stage's cameras."""
     per_second = stage.GetTimeCodesPerSecond()
     if not (math.isfinite(per_second) and per_second > 0):
         report.warn("/", "timeCodesPerSecond is not positive", f"it is {per_second}; 24 is used")
@@ -164,7 +208,7 @@ def choose_frames(stage: Usd.Stage, options: Options, report: Notebook) -> Frame
     codes = [start + step for step in range(int(end - start) + 1)]
     if codes[-1] < end:
         codes.append(end)
-    return Frames(tuple(codes), per_second)
+    return Frames(tuple(codes), per_second, stage_shutters(Usd.PrimRange(stage.GetPseudoRoot(), PREDICATE), start))
 
 
 def _sampled_range(stage: Usd.Stage) -> tuple[float, float]:

@@ -83,6 +83,38 @@ def continuous(quaternions: np.ndarray) -> np.ndarray:
     return quaternions * signs[:, None]
 
 
+def slerp(first: np.ndarray, second: np.ndarray, share: np.ndarray) -> np.ndarray:
+    """Unit quaternions (n, 4) at a share (n, 1) of the shorter way between two stacks of them."""
+    cosine = np.einsum("ni,ni->n", first, second)[:, None]
+    second = np.where(cosine < 0, -second, second)
+    angle = np.arctan2(np.linalg.norm(second - first, axis=1), np.linalg.norm(second + first, axis=1))[:, None] * 2
+    # A quarter of a circle at most; where there is no angle, the mean is as good.
+    sine = np.sin(angle)
+    small = sine < 1e-9
+    weights = [np.sin(part * angle) / np.where(small, 1.0, sine) for part in (1 - share, share)]
+    weights = [np.where(small, part, weight) for part, weight in zip((1 - share, share), weights, strict=True)]
+    return weights[0] * first + weights[1] * second
+
+
+def between(first: np.ndarray, second: np.ndarray, share: np.ndarray) -> np.ndarray:
+    """Matrices (n, 4, 4) at a share (n,) of the way between two stacks of them, as glTF goes it: by translation,
+    rotation and scale. Where there is shear, linearly."""
+    share = share[:, None]
+    (t0, r0, s0, shear0), (t1, r1, s1, shear1) = decompose(first), decompose(second)
+    x, y, z, w = slerp(r0, r1, share).T
+    turned = np.array([
+        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+    ])  # fmt: skip
+    found = np.tile(np.eye(4), (len(first), 1, 1))
+    found[:, :3, :3] = np.moveaxis(turned, 2, 0) * (s0 + share * (s1 - s0))[:, None, :]
+    found[:, :3, 3] = t0 + share * (t1 - t0)
+    sheared = np.maximum(shear0, shear1) > SHEAR_TOLERANCE
+    found[sheared] = (first + share[:, None] * (second - first))[sheared]
+    return found
+
+
 def split_shear(matrices: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Two stacks without shear whose product is `matrices` (n, 4, 4): rotated scales, and rotations.
 

@@ -127,6 +127,34 @@ def test_what_is_up_to_date_is_told_as_candelabra_run_hears_it(export, monkeypat
     assert export(LAMP).out == f"{path}: up to date\n"
 
 
+def test_progress_is_told_as_events_where_that_is_asked_for(export, monkeypatch):
+    prims = "\n".join(f'def Xform "X{at}" {{ def Cube "C" {{}} }}' for at in range(50))
+    monkeypatch.setattr("usd_gltf.progress._PAUSE_S", {"json": 0.0, "terminal": 0.0})
+    *events, written = export(prims, "--progress", "json").out.splitlines()
+    events = [json.loads(event) for event in events]
+    stages = [event["name"] for event in events if event["event"] == "stage"]
+    assert stages == ["opening the stage", "reading prims", "making nodes", "writing"]
+    done = [event["done"] for event in events if event["event"] == "progress"]
+    assert len(done) == 100 and done == sorted(set(done)) and 0 < done[0] and done[-1] <= 1
+    assert all(event.get("frame", 0) is None for event in events if event["event"] == "progress")
+    assert "written" in written
+
+
+@pytest.mark.parametrize("form", ["auto", "none"])
+def test_progress_is_a_line_on_a_terminal_that_is_gone_at_the_end(export, monkeypatch, form):
+    monkeypatch.setattr("sys.stderr.isatty", lambda: True, raising=False)
+    text = LAMP + "\n" + 'def PluginLight "P" {}'
+    err = export(text, f"--progress={form}", out="shown.glb").err
+    assert ("reading prims: " in err) == (form == "auto")
+    assert "\n" not in err.split("warning: ")[0], "one line, written over"
+    if form == "auto":
+        cleared = err.split("warning: ")[0].split("\r")
+        assert cleared[-1] == "" and cleared[-2].strip() == "", "the report has a line of its own"
+    # Without a terminal nothing is told of it.
+    monkeypatch.setattr("sys.stderr.isatty", lambda: False, raising=False)
+    assert "reading prims" not in export(text, f"--progress={form}", out="still.glb").err
+
+
 def test_strict_writes_the_report_and_nothing_else(export):
     text = LAMP + '\ndef PluginLight "P" {}'
     result = export(text, "--strict")
