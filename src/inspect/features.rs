@@ -94,6 +94,11 @@ pub(super) fn features(
     });
     all.push(Feature::new("camera lenses", needs.lenses));
     all.push(Feature::new("orthographic cameras", needs.orthographic_cameras));
+    all.push(Feature::new("camera shutters", needs.shutters).used_by(
+        needs.animated_nodes + needs.varying_lights,
+        "motion blur; --no-motion-blur switches it off",
+        "nothing moves",
+    ));
     all
 }
 

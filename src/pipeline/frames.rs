@@ -59,8 +59,12 @@ mod tests {
                     };
                     let mut node = Node::fixed("/node", None, Trs::default());
                     node.channels = vec![Channel::Scale(keys)];
-                    let timeline =
-                        Timeline { first_frame, frames_per_second: rate, last_frame: None };
+                    let timeline = Timeline {
+                        zero_frame: first_frame,
+                        first_frame,
+                        frames_per_second: rate,
+                        last_frame: None,
+                    };
                     let mut scene = Scene { nodes: vec![node], timeline, ..Default::default() };
                     let first = first_frame as i32;
                     assert_eq!(frames_of(&scene).last(), Some(&(first + frames)), "{rate}");

@@ -1,11 +1,12 @@
 //! A camera carried from one scene into another, with the nodes that it stands at.
 
-use crate::scene::{Camera, Channel, Interpolation, Keys, Node, Scene, Timeline};
+use crate::scene::{Camera, Channel, Interpolation, Keys, Node, Scene, Shutter, Timeline};
 use std::ops::Mul;
 
 /// Adds a camera's node and all above it to another scene, and returns the camera there. At every frame
 /// the camera is where it was in its own scene, even if the two scenes time their frames differently. The
-/// other scene keeps its frames.
+/// other scene keeps its frames. The camera keeps its shutter unless lights of the other scene change, and none of
+/// that scene's cameras has the same: its trees hold where they are when its own shutters are open.
 pub fn carry_camera(from: &Scene, camera: &Camera, into: &mut Scene) -> Camera {
     let frames = super::frames_of(into);
     into.timeline.last_frame = frames.last().map(|&last| f64::from(last));
@@ -24,7 +25,10 @@ pub fn carry_camera(from: &Scene, camera: &Camera, into: &mut Scene) -> Camera {
         parent = Some(into.nodes.len() as u32);
         into.nodes.push(node);
     }
-    Camera { node: into.nodes.len() as u32 - 1, ..camera.clone() }
+    let is_known =
+        |shutter: &Shutter| !into.has_lights_that_change() || into.shutters().contains(shutter);
+    let shutter = camera.shutter.filter(is_known);
+    Camera { node: into.nodes.len() as u32 - 1, shutter, ..camera.clone() }
 }
 
 fn retime(channel: &mut Channel, from: &Timeline, into: &Timeline) {
@@ -39,7 +43,7 @@ fn retime_keys<T>(keys: &mut Keys<T>, from: &Timeline, into: &Timeline)
 where
     T: Copy + Mul<f32, Output = T>,
 {
-    let frame = |seconds: f64| from.first_frame + seconds * from.frames_per_second;
+    let frame = |seconds: f64| from.zero_frame + seconds * from.frames_per_second;
     for time in &mut keys.times_s {
         *time = into.seconds_at(frame(f64::from(*time))) as f32;
     }
@@ -56,8 +60,38 @@ where
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::Trs;
+    use crate::scene::{Light, LightKind, Trs};
     use glam::Vec3;
+
+    #[test]
+    fn a_shutter_is_kept_where_trees_do_not_depend_on_it() {
+        let carried = |lights_move: bool, own: Option<Shutter>| {
+            let mut from = Scene { source: "cam.glb".into(), ..Default::default() };
+            from.nodes = vec![Node::fixed("/eye", None, Trs::default())];
+            let mut into = Scene::default();
+            let mut node = Node::fixed("/lamp", None, Trs::default());
+            let values = vec![Vec3::ZERO, Vec3::ONE];
+            let keys =
+                Keys { times_s: vec![0.0, 1.0], values, interpolation: Interpolation::Linear };
+            node.channels.extend(lights_move.then_some(Channel::Translation(keys)));
+            into.nodes = vec![node];
+            into.lights = vec![Light {
+                node: 0,
+                kind: LightKind::Point { intensity_cd: Vec3::ONE },
+                values: None,
+                range_m: None,
+                forced: false,
+                visibility: Default::default(),
+            }];
+            into.cameras = vec![Camera { shutter: own, ..Camera::perspective(0, 0.5) }];
+            let shutter = Shutter::new(0.0, 0.5);
+            let camera = Camera { shutter, ..Camera::perspective(0, 0.5) };
+            carry_camera(&from, &camera, &mut into).shutter == shutter
+        };
+        let (same, other) = (Shutter::new(0.0, 0.5), Shutter::new(-0.25, 0.25));
+        assert!(carried(false, None) && carried(false, other) && carried(true, same));
+        assert!(!carried(true, None) && !carried(true, other));
+    }
 
     #[test]
     fn a_camera_moves_as_it_did_frame_by_frame() {
@@ -69,8 +103,12 @@ mod tests {
                 Channel::Translation(Keys { times_s: times.into(), values, interpolation })
             };
             let mut from = Scene { source: "cam.glb".into(), ..Default::default() };
-            from.timeline =
-                Timeline { first_frame: 1001.0, frames_per_second: 25.0, last_frame: None };
+            from.timeline = Timeline {
+                zero_frame: 1000.0,
+                first_frame: 1001.0,
+                frames_per_second: 25.0,
+                last_frame: None,
+            };
             from.nodes = vec![
                 Node::fixed("/other", None, Trs::default()),
                 Node::fixed("/rig", None, Trs::default()),
@@ -79,7 +117,7 @@ mod tests {
             from.nodes[1].channels = vec![keys(&[0.0, 2.0])];
             from.nodes[2].channels = vec![keys(&[0.0, 0.4, 4.0])];
             let mut into = Scene::default();
-            into.timeline.first_frame = 990.0;
+            (into.timeline.zero_frame, into.timeline.first_frame) = (990.0, 990.0);
             into.nodes = vec![Node::fixed("/rig", None, Trs::default())];
             let frames = super::super::frames_of(&into);
 

@@ -15,7 +15,7 @@ use crate::scene::SourceFile;
 use clap::Args;
 use std::env;
 use std::ffi::{OsStr, OsString};
-use std::io::{self, BufRead, BufReader};
+use std::io::{self, BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::Duration;
@@ -28,6 +28,8 @@ const SCRIPT: &str = "scripts/usd_to_gltf.py";
 const FOLDERS_ABOVE: usize = 4;
 /// The exit code of the exporter for options that it does not take.
 const USAGE: i32 = 2;
+/// The stage of a job that runs the exporter.
+const EXPORTING: &str = "exporting the stage";
 /// How long a stopped job may take to notice it.
 const PATIENCE: Duration = Duration::from_millis(20);
 
@@ -168,12 +170,12 @@ impl ExportedStage {
         let python = python(&exporter);
         let mut command = Command::new(&python);
         command.arg(&exporter).arg(absolute(source)).arg(exported.path());
-        command.args(options.arguments());
+        command.arg("--progress=json").args(options.arguments());
         if let Some(strict) = strict {
             command.arg(format!("--strict={strict}"));
         }
-        command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::piped());
-        watch.tell(Event::Stage { name: "exporting the stage".into() });
+        command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
+        watch.tell(Event::Stage { name: EXPORTING.into() });
         let child = command.spawn();
         let child =
             child.map_err(|cause| StageError::NoPython { scene: source.into(), python, cause })?;
@@ -203,12 +205,21 @@ impl ExportedStage {
 /// Tells what the exporter says, and waits for its end.
 fn listen(mut child: Child, source: &Path, watch: &dyn Watch) -> Result<(), StageError> {
     let stderr = child.stderr.take();
-    let said = std::thread::spawn(move || {
-        let lines = stderr.into_iter().flat_map(|pipe| BufReader::new(pipe).split(b'\n'));
-        let lines = lines.map_while(Result::ok);
-        lines.map(|line| String::from_utf8_lossy(&line).trim_end().to_owned()).collect::<Vec<_>>()
-    });
+    let said = std::thread::spawn(move || lines_of(stderr).collect::<Vec<_>>());
+    let (told, events) = std::sync::mpsc::channel();
+    let stdout = child.stdout.take();
+    // It ends with the pipe; who listens may have gone by then.
+    std::thread::spawn(move || lines_of(stdout).try_for_each(|line| told.send(line)));
+    let mut shown = 0;
     let ended = loop {
+        for line in events.try_iter() {
+            let Ok(Event::Progress { done, .. }) = serde_json::from_str(&line) else { continue };
+            let tenths = (10.0 * done) as u32;
+            if tenths > shown {
+                shown = tenths;
+                watch.tell(Event::Stage { name: format!("{EXPORTING}: {} %", 10 * tenths) });
+            }
+        }
         if watch.is_stopped() {
             // It may have ended by itself meanwhile.
             let _ = child.kill();
@@ -242,6 +253,12 @@ fn listen(mut child: Child, source: &Path, watch: &dyn Watch) -> Result<(), Stag
         said => said.to_owned(),
     };
     Err(StageError::Refused { said, is_usage: code == Some(USAGE) })
+}
+
+/// What a pipe has to say, line by line.
+fn lines_of(pipe: Option<impl Read>) -> impl Iterator<Item = String> {
+    let lines = pipe.into_iter().flat_map(|pipe| BufReader::new(pipe).split(b'\n'));
+    lines.map_while(Result::ok).map(|line| String::from_utf8_lossy(&line).trim_end().to_owned())
 }
 
 /// What a line of the exporter notes; `None` if it is an error.

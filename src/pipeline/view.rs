@@ -51,7 +51,7 @@ pub struct View {
 pub struct Look {
     /// The camera, at a node of the scene.
     pub camera: Camera,
-    /// Where it stands, for the user, if the user did not say.
+    /// What the user is told of it: where it stands, if the user did not say; what of it is left out.
     pub note: Option<String>,
 }
 
@@ -121,11 +121,19 @@ pub fn look(scene: &mut Scene, view: &View, aspect: f32) -> Result<Look, ViewErr
         }
         if let Some((file, wanted)) = file_of(wanted) {
             let other = load_scene(file)?;
-            let camera = find(&other, wanted)?;
-            let camera = carry_camera(&other, camera, scene);
+            let wanted = find(&other, wanted)?;
+            let camera = carry_camera(&other, wanted, scene);
+            let note = (camera.shutter != wanted.shutter).then(|| {
+                format!(
+                    "{}: its camera's shutter is left out: lights of {} change, and none of its cameras has that \
+                     shutter",
+                    other.source.display(),
+                    scene.source.display()
+                )
+            });
             // What the picture depends on, and what it must not replace.
             scene.files.extend(other.files);
-            return own(camera);
+            return Ok(Look { camera, note });
         }
         return own(find(scene, Some(wanted))?.clone());
     }

@@ -32,7 +32,7 @@ fn places(scene: &Scene) -> Vec<Key> {
             false => still(&pose, at as u32),
             true => {
                 let mut hasher = Hasher::new();
-                let clock = (scene.timeline.first_frame, scene.timeline.frames_per_second);
+                let clock = (scene.timeline.zero_frame, scene.timeline.frames_per_second);
                 hasher.update(format!("{:?} {clock:?} {}", node.local, scene.origin).as_bytes());
                 hasher.update(&node.parent.map_or([0; 32], |parent| places[parent as usize]));
                 node.channels.iter().for_each(|channel| add_channel(&mut hasher, channel));

@@ -117,6 +117,19 @@ impl Scene {
         nodes.all(|node| one.world(node) == other.world(node))
     }
 
+    /// Whether any light but those at infinity moves, or varies in strength.
+    pub fn has_lights_that_change(&self) -> bool {
+        let moving = self.moving_nodes();
+        let changes = |node: u32, values: &Option<Keys<_>>| {
+            moving[node as usize] || values.as_ref().is_some_and(Keys::varies)
+        };
+        let shines = |row: &usize| self.peak_rgb_of_instance(*row as u32).max_element() > 0.0;
+        let mut meshes = (0..self.instances.len()).filter(shines).map(|row| &self.instances[row]);
+        let mut lights = self.lights.iter().filter(|light| !light.kind.is_infinite());
+        meshes.any(|mesh| changes(mesh.node, &mesh.values))
+            || lights.any(|light| changes(light.node, &light.values))
+    }
+
     /// For each node, whether it moves with time.
     pub fn moving_nodes(&self) -> Vec<bool> {
         pose::moving(&self.nodes)

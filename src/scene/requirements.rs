@@ -56,6 +56,8 @@ pub struct Requirements {
     pub lenses: usize,
     /// Orthographic cameras.
     pub orthographic_cameras: usize,
+    /// Cameras with a shutter.
+    pub shutters: usize,
 }
 
 impl Requirements {
@@ -124,6 +126,7 @@ impl Requirements {
         needs.lenses = scene.cameras.iter().filter(|c| c.lens_radius_m > 0.0).count();
         let is_parallel = |c: &&Camera| matches!(c.projection, Projection::Orthographic { .. });
         needs.orthographic_cameras = scene.cameras.iter().filter(is_parallel).count();
+        needs.shutters = scene.cameras.iter().filter(|c| c.shutter.is_some()).count();
         needs
     }
 }

@@ -13,7 +13,10 @@
 /// the nearest.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Timeline {
-    /// The frame that is second 0.
+    /// The frame that is second 0. It is before the first if a shutter opens before its frame: files have no
+    /// negative times.
+    pub zero_frame: f64,
+    /// The first frame of the shot.
     pub first_frame: f64,
     /// Frames in a second.
     pub frames_per_second: f64,
@@ -23,20 +26,20 @@ pub struct Timeline {
 
 impl Default for Timeline {
     fn default() -> Self {
-        Timeline { first_frame: 1.0, frames_per_second: 24.0, last_frame: None }
+        Timeline { zero_frame: 1.0, first_frame: 1.0, frames_per_second: 24.0, last_frame: None }
     }
 }
 
 impl Timeline {
     /// Seconds on the animation clock at a frame.
     pub fn seconds_at(&self, frame: f64) -> f64 {
-        (frame - self.first_frame) / self.frames_per_second
+        (frame - self.zero_frame) / self.frames_per_second
     }
 
     /// The frame at which the animation clock shows some seconds: a whole number if it is the
     /// [same time](Self::is_same) as that of a whole frame.
     pub fn frame_at(&self, time_s: f64) -> f64 {
-        let frame = self.first_frame + time_s * self.frames_per_second;
+        let frame = self.zero_frame + time_s * self.frames_per_second;
         let whole = frame.round();
         if self.is_same(self.seconds_at(whole), time_s) { whole } else { frame }
     }
@@ -72,8 +75,12 @@ mod tests {
     fn a_key_is_at_its_frame_and_at_no_other() {
         for rate in RATES {
             for first in [1.0, 1001.0, -86_400.0] {
-                let timeline =
-                    Timeline { first_frame: first, frames_per_second: rate, last_frame: None };
+                let timeline = Timeline {
+                    zero_frame: first,
+                    first_frame: first,
+                    frames_per_second: rate,
+                    last_frame: None,
+                };
                 for frame in 0..FRAMES {
                     for key_s in times(frame, rate).map(f64::from) {
                         let number = f64::from(frame) + first;
@@ -113,7 +120,12 @@ mod tests {
             forced: false,
             visibility: Visibility::default(),
         };
-        let timeline = Timeline { first_frame: first, frames_per_second: rate, last_frame: None };
+        let timeline = Timeline {
+            zero_frame: first,
+            first_frame: first,
+            frames_per_second: rate,
+            last_frame: None,
+        };
         Scene { nodes: vec![node], lights: vec![light], timeline, ..Default::default() }
     }
 

@@ -54,10 +54,10 @@ impl Stage {
         end(&mut self.command(RENDER, &format!("scene.usda -o a.exr {QUICK} {arguments}")))
     }
 
-    /// What the exporter was told after its own name, the stage and the output.
+    /// What the exporter was told after its own name, the stage, the output and how to tell its progress.
     fn options(&self) -> Vec<String> {
         let told = String::from_utf8(self.shot.read("told.txt")).unwrap();
-        told.lines().skip(3).map(String::from).collect()
+        told.lines().skip(4).map(String::from).collect()
     }
 
     /// What lies in the folder and was not there before.
@@ -79,6 +79,24 @@ fn end(command: &mut Command) -> Ended {
 
 fn exporter() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("scripts/usd_to_gltf.py")
+}
+
+#[test]
+fn progress_of_the_exporter_is_told() {
+    let stage = Stage::with(
+        "for done in 0.05 0.21 0.26 0.9; do echo \"{\\\"event\\\":\\\"progress\\\",\\\"done\\\":$done,\\\"frame\\\":null}\"; done\n\
+         echo written\nsleep 0.1\ncp \"$(dirname \"$2\")/shot.gltf\" \"$3\"",
+    );
+    let arguments = "scene.usda -o a.exr --res 12x8 --spp 1 --progress json";
+    let output = stage.command(RENDER, arguments).output().unwrap();
+    let told = String::from_utf8(output.stdout).unwrap();
+    let stages = told.lines().filter(|line| line.contains("exporting")).collect::<Vec<_>>();
+    let shown: Vec<bool> = ["stage\"", ": 20 %", ": 90 %"]
+        .iter()
+        .zip(&stages)
+        .map(|(expected, line)| line.contains(expected))
+        .collect();
+    assert!(stages.len() == 3 && shown == [true; 3], "{told}");
 }
 
 #[test]

@@ -2,9 +2,12 @@
 
 use crate::files;
 use crate::files::{File, lamp};
-use candelabra::scene::{LightKind, Pixels, Projection, Scene, Shaping, Timeline, Visibility};
+use candelabra::pipeline::frames_of;
+use candelabra::scene::{
+    LightKind, Pixels, Projection, Scene, Shaping, Shutter, Timeline, Visibility,
+};
 use glam::{DVec3, Vec3};
-use serde_json::json;
+use serde_json::{Value, json};
 use std::f32::consts::{FRAC_PI_3, FRAC_PI_6};
 
 fn load(edit: impl FnOnce(&mut File)) -> Scene {
@@ -251,9 +254,38 @@ fn the_clock_is_the_stages() {
             "timeCodesPerSecond": 25, "startTimeCode": 1001, "endTimeCode": 1048,
         }});
     });
-    let expected =
-        Timeline { first_frame: 1001.0, frames_per_second: 25.0, last_frame: Some(1048.0) };
+    let expected = Timeline {
+        zero_frame: 1001.0,
+        first_frame: 1001.0,
+        frames_per_second: 25.0,
+        last_frame: Some(1048.0),
+    };
     assert_eq!(scene.timeline, expected);
+    // A shutter that opens before its frame: the frames are the same, and come later.
+    let scene = load(|file| {
+        file.json["asset"]["extras"] = json!({"usd": {
+            "timeCodesPerSecond": 25, "startTimeCode": 1001, "endTimeCode": 1048, "zeroTimeCode": 1000,
+        }});
+    });
+    assert_eq!(scene.timeline, Timeline { zero_frame: 1000.0, ..expected });
+    assert_eq!(frames_of(&scene), (1001..=1048).collect::<Vec<_>>());
+}
+
+#[test]
+fn a_shutter_is_open_between_two_times() {
+    let shutter = |shutter: Value| {
+        let scene = load(|file| {
+            let camera = json!({"type": "perspective", "perspective": {"yfov": 1.0, "znear": 0.1}});
+            file.add("cameras", camera);
+            file.json["nodes"][0]["camera"] = json!(0);
+            file.json["nodes"][0]["extras"] = json!({"usdCamera": {"shutter": shutter}});
+        });
+        (scene.cameras[0].shutter, scene.notes.len())
+    };
+    assert_eq!(shutter(json!([-0.25, 0.25])), (Shutter::new(-0.25, 0.25), 0));
+    for closed in [json!([0.5, 0.5]), json!([0.5, -0.5]), json!([1e39, 1e39])] {
+        assert_eq!(shutter(closed), (None, 1));
+    }
 }
 
 #[test]

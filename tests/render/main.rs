@@ -28,6 +28,7 @@ mod shadows;
 #[path = "../ingest/shared.rs"]
 mod shared;
 mod shared_trees;
+mod shutter;
 mod stage;
 mod statistics;
 mod strategies;

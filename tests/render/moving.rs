@@ -94,7 +94,7 @@ fn keys(values: [Vec3; 3]) -> Option<Keys<Vec3>> {
 
 /// A room in which a light of every kind flickers beside one that does not. Their constants are not
 /// what any frame shows; some are dark at first, some in the end, and one moves as well.
-fn flicker() -> Stage {
+pub fn flicker() -> Stage {
     let mut stage = carousel();
     let (dark, dim, bright) = (Vec3::ZERO, Vec3::new(0.5, 1.0, 2.0), Vec3::new(9.0, 6.0, 3.0));
     let panel = stage.quad([0.4; 2], glow(dark), facing(DVec3::new(-1.0, 1.2, 0.5), DVec3::ZERO));

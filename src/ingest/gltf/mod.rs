@@ -103,8 +103,10 @@ fn timeline(document: &Document) -> Result<Timeline, Fault> {
     if rate <= 0.0 {
         return Err(Fault::new("asset, extras.usd", "timeCodesPerSecond is not positive"));
     }
+    let first_frame = usd.start_time_code.map_or(default.first_frame, |code| code.f64());
     Ok(Timeline {
-        first_frame: usd.start_time_code.map_or(default.first_frame, |code| code.f64()),
+        zero_frame: usd.zero_time_code.map_or(first_frame, |code| code.f64()),
+        first_frame,
         frames_per_second: rate,
         last_frame: usd.end_time_code.map(|code| code.f64()),
     })

@@ -13,6 +13,7 @@ use std::collections::HashMap;
 #[serde(rename_all = "camelCase")]
 pub(in crate::ingest::gltf) struct AssetUsd {
     pub time_codes_per_second: Option<Real>,
+    pub zero_time_code: Option<Real>,
     pub start_time_code: Option<Real>,
     pub end_time_code: Option<Real>,
 }
