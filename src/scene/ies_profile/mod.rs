@@ -234,6 +234,15 @@ impl IesProfile {
         }
     }
 
+    /// Whether the scale spreads a pole at the end of a row's stretch over directions of all planes.
+    fn is_spread(&self, row: usize) -> bool {
+        match self.angle_scale {
+            scale if scale > 0.0 => self.polar_rad[row + 1] >= PI - SLACK,
+            scale if scale < 0.0 => self.polar_rad[row] <= SLACK,
+            _ => false,
+        }
+    }
+
     /// A cone outside which it is dark, but for rounding.
     fn find_lit(&self) -> LitCone {
         let everywhere = LitCone { axis: DVec3::NEG_Z, half_angle_rad: PI };
@@ -268,7 +277,7 @@ impl IesProfile {
         if PI - low < high {
             best = LitCone { axis: -pole, half_angle_rad: PI - low };
         }
-        if planes == 1 {
+        if planes == 1 || cells().any(|(_, row)| self.is_spread(row)) {
             return best;
         }
         // About the middle of what is lit, from pieces of cells that are small enough to count as discs. There may be many
