@@ -5,7 +5,7 @@ use crate::scene::Scene;
 use glam::Vec3;
 
 /// Coordinates in the world stay below this many metres, so that squares of distances are finite.
-const FARTHEST_M: f32 = 1e18;
+pub(super) const FARTHEST_M: f32 = 1e18;
 
 /// Checks the world transform of every node, and the world coordinates of every mesh, at rest.
 pub(super) fn check(scene: &Scene) -> Result<(), Fault> {

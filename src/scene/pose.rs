@@ -200,6 +200,11 @@ impl Node {
         Node { path: path.into(), parent, local, channels: Vec::new() }
     }
 
+    /// Local to parent at a time, seconds on the clock of a timeline.
+    pub fn to_parent(&self, time_s: f64, timeline: Timeline) -> DAffine3 {
+        self.local_at(Instant { time_s, timeline })
+    }
+
     /// Local to world at a time, seen from an origin, given that of all nodes before.
     pub(super) fn in_world(&self, origin: DVec3, before: &[DAffine3], at: Instant) -> DAffine3 {
         let local = self.local_at(at);
@@ -280,6 +285,11 @@ impl<T: Copy> Keys<T> {
 }
 
 impl Keys<Vec3> {
+    /// The value at a time, seconds on the clock of a timeline.
+    pub fn at(&self, time_s: f64, timeline: Timeline) -> DVec3 {
+        self.vector_at(Instant { time_s, timeline })
+    }
+
     /// The largest of each component over all keys: what values that are no spline never exceed.
     pub(super) fn peak(&self) -> Vec3 {
         self.values.iter().fold(Vec3::ZERO, |peak, &value| peak.max(value))

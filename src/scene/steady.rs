@@ -50,6 +50,11 @@ impl Keys<Vec3> {
         self.steady(is_near, |tangent, step_s| tangent.as_dvec3().length() * step_s <= tolerance)
     }
 
+    /// Whether one vector holds at all times, up to a distance.
+    pub fn is_steady(&self, tolerance: f64) -> bool {
+        self.steady_within(tolerance).is_some()
+    }
+
     /// The longest of the values.
     fn longest(&self) -> f64 {
         self.values.iter().map(|value| value.as_dvec3().length()).fold(0.0, f64::max)

@@ -11,6 +11,9 @@ mod mended;
 mod mended_textures;
 mod obj;
 mod open_exr;
+mod posing;
+mod posing_mended;
+mod posing_puppets;
 #[path = "../fuzz/probe/scene.rs"]
 mod probe;
 mod real;

@@ -1,6 +1,6 @@
 //! Files that others collected because they broke something, and files broken here.
 
-use crate::{files, shared};
+use crate::{files, posing, shared};
 use candelabra::ingest::load;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
@@ -216,6 +216,10 @@ fn rich() -> files::File {
         json!({"type": "SphereLight", "values": {"times": [0, 1], "rgb": [[1, 2, 3], [0, 0, 4]]}}),
     );
     file.json["scenes"][0]["nodes"] = json!([0, 2]);
+    posing::target(&mut file, &[("POSITION", &[0.5; 9]), ("NORMAL", &[0.0; 9])]);
+    posing::animate(&mut file, 0, "weights", &[0.0, 1.0], &[1.0, 0.5], "LINEAR");
+    let influences = vec![[(0, 0.5), (1, 0.25), (0, 0.25), (0, 0.0)]; 3];
+    posing::bind(&mut file, &[2, 0], Some(&[glam::Mat4::IDENTITY; 2]), &[influences]);
     file.json["accessors"][0]["sparse"] = json!({
         "count": 1,
         "indices": {"bufferView": 1, "componentType": 5123},

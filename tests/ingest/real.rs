@@ -3,6 +3,7 @@
 use crate::shared;
 use candelabra::ingest::load;
 use candelabra::scene::{LightKind, Scene};
+use glam::Vec3;
 use std::path::PathBuf;
 
 fn real(file: &str) -> Option<Scene> {
@@ -126,6 +127,33 @@ fn punctual_lights_are_counted() {
     let man = real("cesium_man_with_light/cesium_man_with_light.glb").unwrap();
     assert_eq!(punctual(&man), [0, 1, 0]);
     assert!(man.requirements().animated_nodes > 0);
+}
+
+/// The world box of an instance at second 0.
+fn bounds(scene: &Scene, path: &str) -> [Vec3; 2] {
+    let found = scene.instances.iter().find(|instance| instance.path.ends_with(path));
+    let instance = found.unwrap_or_else(|| panic!("{path}"));
+    let world = scene.pose_at(0.0).world(instance.node);
+    let positions = &scene.meshes[instance.mesh as usize].positions;
+    let places = positions.iter().map(|&place| world.transform_point3(place));
+    places.fold([Vec3::INFINITY, Vec3::NEG_INFINITY], |[low, high], p| [low.min(p), high.max(p)])
+}
+
+/// Boxes that another program found, which reads nothing but accessors (numpy). At rest the man's arms are spread
+/// along z, and the cylinder stands upright.
+#[test]
+fn skinned_meshes_are_where_others_see_them() {
+    let Some(man) = real("cesium_man_with_light/cesium_man_with_light.glb") else { return };
+    let near = |found: [Vec3; 2], low: [f32; 3], high: [f32; 3]| {
+        let off = (found[0] - Vec3::from(low)).abs().max((found[1] - Vec3::from(high)).abs());
+        assert!(off.max_element() < 1e-5, "{found:?}");
+    };
+    let found = bounds(&man, "Cesium_Man");
+    near(found, [-0.451214, -0.008300, -0.194338], [0.461872, 1.441551, 0.301814]);
+    assert!(man.notes.iter().any(|note| note.text.contains("deforms")), "{:?}", man.notes);
+    let file = "blenderio_emission_and_pointer/24_animation_pointer/24_animation_pointer.gltf";
+    let found = bounds(&real(file).unwrap(), "Cylinder");
+    near(found, [1.173684, -0.014593, -2.557314], [2.763228, 0.763949, -2.057314]);
 }
 
 #[test]

@@ -188,6 +188,15 @@ impl<'a> Accessor<'a> {
         vector
     }
 
+    /// An element of floats as a matrix, column by column; zeros if it is none.
+    pub(super) fn matrix(&self, i: usize) -> [f32; 16] {
+        let mut matrix = [0.0; 16];
+        for (value, bytes) in matrix.iter_mut().zip(self.element(i).as_chunks::<4>().0) {
+            *value = f32::from_le_bytes(*bytes);
+        }
+        matrix
+    }
+
     /// An element as a vertex index.
     pub(super) fn index(&self, i: usize) -> u32 {
         match (self.component, self.element(i)) {

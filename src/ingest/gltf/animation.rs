@@ -3,7 +3,8 @@
 //! A channel that cannot be read is left out; one whose keys are only partly good keeps those.
 
 use super::accessors::Accessor;
-use super::document::{Target, label};
+use super::document::{Target, Transform, label};
+use super::posing::Weights;
 use super::{Output, Source};
 use crate::ingest::error::Fault;
 use crate::scene::{Category, Channel, Interpolation, Keys};
@@ -11,15 +12,40 @@ use glam::{Quat, Vec3};
 use gltf::json::accessor::{ComponentType, Type};
 use gltf::json::animation::{Interpolation as RowInterpolation, Sampler};
 use gltf::json::validation::Checked;
-use std::collections::HashSet;
+use std::collections::{BTreeMap, HashSet};
 
 /// How far the length of a key's quaternion may be from one without a note; small integers are coarse.
 const QUATERNION_TOLERANCE: f32 = 0.03;
 
-/// The channels of every node of the file.
-pub(super) fn compile(source: &Source, output: &mut Output) -> Result<Vec<Vec<Channel>>, Fault> {
+/// The path of a channel that animates morph targets.
+const WEIGHTS: &str = "weights";
+
+/// What animations say of the nodes of a file.
+pub(super) struct Animated {
+    /// The channels of every node.
+    pub channels: Vec<Vec<Channel>>,
+    /// Of the nodes whose weights of morph targets are animated.
+    pub weights: BTreeMap<usize, Weights>,
+}
+
+/// The keys of a sampler that can be read.
+pub(super) struct Track {
+    pub interpolation: Interpolation,
+    pub times_s: Vec<f32>,
+    /// Which values belong to the keys, three of them to one of a spline.
+    pub rows: Vec<usize>,
+    /// How many elements of its accessor a value is.
+    pub width: usize,
+    /// What had to be mended.
+    mended: Option<&'static str>,
+}
+
+/// The channels and weights of every node of the file.
+pub(super) fn compile(source: &Source, output: &mut Output) -> Result<Animated, Fault> {
     let document = source.document;
+    let timeline = output.scene.timeline;
     let mut channels: Vec<Vec<Channel>> = document.nodes.iter().map(|_| Vec::new()).collect();
+    let mut weights = BTreeMap::new();
     let mut moved = HashSet::new();
     for (i, animation) in document.animations.iter().enumerate() {
         let object = label("animation", i, animation.name.as_deref());
@@ -30,7 +56,8 @@ pub(super) fn compile(source: &Source, output: &mut Output) -> Result<Vec<Vec<Ch
                 continue;
             };
             let transform = document.beside.transforms.get(node);
-            if transform.is_none_or(|transform| transform.matrix.is_some()) {
+            let can = |transform: &Transform| path == WEIGHTS || transform.matrix.is_none();
+            if !transform.is_some_and(can) {
                 let text = "moves nothing that could move; left out";
                 output.notes.add(Category::Animation, &*object, text);
                 continue;
@@ -52,14 +79,18 @@ pub(super) fn compile(source: &Source, output: &mut Output) -> Result<Vec<Vec<Ch
                 Ok((sampler, times, values)) => {
                     let bytes = (times.count as u64 + 4 * values.count as u64) * 4;
                     output.budget.take(bytes, || object.clone())?;
-                    channel(path, sampler, times, values)
+                    track(path, sampler, times, values).map(|track| (track, values))
                 }
             };
             match compiled {
-                Ok((channel, mended)) => {
+                Ok((mut track, values)) => {
                     moved.insert((node, path));
-                    channels[node].push(channel);
-                    if let Some(text) = mended {
+                    if path == WEIGHTS {
+                        weights.insert(node, Weights::of(&track, values, timeline));
+                    } else {
+                        channels[node].push(channel(path, &mut track, values));
+                    }
+                    if let Some(text) = track.mended {
                         output.notes.add(Category::Animation, &*object, text);
                     }
                 }
@@ -70,7 +101,7 @@ pub(super) fn compile(source: &Source, output: &mut Output) -> Result<Vec<Vec<Ch
             }
         }
     }
-    Ok(channels)
+    Ok(Animated { channels, weights })
 }
 
 /// How many bytes the keys of a channel take.
@@ -84,9 +115,10 @@ pub(super) fn byte_length(channel: &Channel) -> u64 {
     }
 }
 
-/// The node and the part of its transform that a channel moves, directly or by a pointer.
+/// The node and what of it a channel moves, directly or by a pointer.
 fn target(target: &Target) -> Option<(usize, &'static str)> {
-    let part = |name: &str| ["translation", "rotation", "scale"].into_iter().find(|p| *p == name);
+    let parts = ["translation", "rotation", "scale", WEIGHTS];
+    let part = |name: &str| parts.into_iter().find(|part| *part == name);
     match &target.extensions.pointer {
         Some(pointer) => {
             let (node, path) = pointer.pointer.strip_prefix("/nodes/")?.split_once('/')?;
@@ -113,21 +145,18 @@ fn unread(target: &Target) -> (&str, Category, &'static str) {
             (Category::Lights, "animation of light is not read; the light is constant")
         }
         Some("meshes") => (Category::Animation, "animation of shapes is not read"),
-        _ if pointer.ends_with("/weights") => {
-            (Category::Animation, "animation of shapes is not read")
-        }
         _ => (Category::Animation, "animation of this is not read"),
     };
     (pointer, category, text)
 }
 
-/// A channel, and what had to be mended in it; else what is wrong with it.
-fn channel(
+/// The keys of a track that can be read; else what is wrong with it.
+fn track(
     path: &str,
     sampler: &Sampler,
     times: &Accessor,
     values: &Accessor,
-) -> Result<(Channel, Option<&'static str>), String> {
+) -> Result<Track, String> {
     let mut interpolation = match sampler.interpolation {
         Checked::Valid(RowInterpolation::Step) => Interpolation::Step,
         Checked::Valid(RowInterpolation::CubicSpline) => Interpolation::Cubic,
@@ -138,16 +167,25 @@ fn channel(
         return Err("its key times are not floats".into());
     }
     let in_a_key = if interpolation == Interpolation::Cubic { 3 } else { 1 };
-    let shape = if path == "rotation" { Type::Vec4 } else { Type::Vec3 };
+    let shape = match path {
+        "rotation" => Type::Vec4,
+        WEIGHTS => Type::Scalar,
+        _ => Type::Vec3,
+    };
     let typed = values.component == ComponentType::F32 || values.normalized;
     if values.shape != shape || !typed || !values.has_data() {
         return Err(format!("its {path} values have a type that they cannot have"));
     }
-    if values.count / in_a_key < times.count {
+    let width = match path {
+        WEIGHTS => (values.count / times.count / in_a_key).max(1),
+        _ => 1,
+    };
+    let key_width = width * in_a_key;
+    if values.count / key_width < times.count {
         return Err(format!("has {} keys, but {} {path} values", times.count, values.count));
     }
     let mut mended = None;
-    if values.count != times.count * in_a_key {
+    if values.count / key_width > times.count || !values.count.is_multiple_of(key_width) {
         mended = Some("has more values than keys; those beyond are left out");
     }
     // Keys that are good, ascending.
@@ -155,7 +193,7 @@ fn channel(
     let mut last = f32::NEG_INFINITY;
     for key in 0..times.count {
         let [time] = times.vector::<1>(key, 0.0);
-        let all = key * in_a_key..(key + 1) * in_a_key;
+        let all = key * key_width..(key + 1) * key_width;
         let is_finite =
             all.map(|i| values.vector::<4>(i, 0.0)).all(|v| Quat::from_array(v).is_finite());
         if time.is_finite() && time > last && is_finite {
@@ -178,17 +216,24 @@ fn channel(
     if is_point {
         interpolation = Interpolation::Linear;
     }
-    let vectors = || rows.iter().map(|&i| Vec3::from_array(values.vector(i, 0.0))).collect();
-    let channel = match path {
+    Ok(Track { interpolation, times_s, rows, width, mended })
+}
+
+/// The channel of a part of a transform. Its rotations are made unit quaternions.
+fn channel(path: &str, track: &mut Track, values: &Accessor) -> Channel {
+    let (times_s, interpolation) = (track.times_s.clone(), track.interpolation);
+    let rows = track.rows.iter();
+    let vectors = || rows.clone().map(|&i| Vec3::from_array(values.vector(i, 0.0))).collect();
+    match path {
         "rotation" => {
             let mut values: Vec<Quat> =
-                rows.iter().map(|&i| Quat::from_array(values.vector(i, 0.0))).collect();
-            let in_a_key = if is_point { 1 } else { in_a_key };
+                rows.map(|&i| Quat::from_array(values.vector(i, 0.0))).collect();
+            let in_a_key = if interpolation == Interpolation::Cubic { 3 } else { 1 };
             // Of a spline only the middle of each three is a rotation.
             for value in values.iter_mut().skip(in_a_key / 2).step_by(in_a_key) {
                 let length = value.length();
                 if (length - 1.0).abs() > QUATERNION_TOLERANCE {
-                    mended = Some("has rotations that are not unit quaternions; mended");
+                    track.mended = Some("has rotations that are not unit quaternions; mended");
                 }
                 let has_direction = length > 0.0 && length.is_finite();
                 *value = if has_direction { *value / length } else { Quat::IDENTITY };
@@ -197,6 +242,5 @@ fn channel(
         }
         "scale" => Channel::Scale(Keys { times_s, values: vectors(), interpolation }),
         _ => Channel::Translation(Keys { times_s, values: vectors(), interpolation }),
-    };
-    Ok((channel, mended))
+    }
 }

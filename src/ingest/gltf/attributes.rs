@@ -50,6 +50,37 @@ impl<'a> Attributes<'a> {
         }
     }
 
+    /// The displacements by which a morph target moves an attribute, if it does.
+    pub(super) fn of_target(
+        &self,
+        target: usize,
+        semantic: Semantic,
+        positions: usize,
+    ) -> Result<Option<&'a Accessor<'a>>, String> {
+        let name = Checked::Valid(semantic.clone()).to_string();
+        let own = Semantic::Extras(format!("target {target} {name}"));
+        let Some(accessor) = self.get(own)? else { return Ok(None) };
+        // They have no handedness, and tangents else do.
+        let semantic = if semantic == Semantic::Tangents { Semantic::Normals } else { semantic };
+        match allows(&Checked::Valid(semantic), accessor) {
+            true if accessor.count >= positions => Ok(Some(accessor)),
+            true => Err(format!("morph target {target} has fewer {name} than there are positions")),
+            false => Err(format!("the {name} of morph target {target} has a type it cannot have")),
+        }
+    }
+
+    /// Whether morph targets displace anything that is not part of the shape.
+    pub(super) fn targets_color(&self) -> bool {
+        self.primitive.attributes.keys().any(|key| match key {
+            Checked::Valid(Semantic::Extras(name)) => {
+                name.strip_prefix("target ").and_then(|name| name.split_once(' ')).is_some_and(
+                    |(_, what)| what.starts_with("COLOR_") || what.starts_with("TEXCOORD_"),
+                )
+            }
+            _ => false,
+        })
+    }
+
     /// Whether positions are inside the bounds that the file declares, if it does and they are floats.
     pub(super) fn bounds_hold(&self, positions: &[Vec3]) -> bool {
         let index = self.primitive.attributes.get(&Checked::Valid(Semantic::Positions));
@@ -104,6 +135,10 @@ fn allows(semantic: &Checked<Semantic>, accessor: &Accessor) -> bool {
         Semantic::Colors(_) => {
             (shape == Type::Vec3 || shape == Type::Vec4) && (float || unsigned_norm)
         }
-        Semantic::Joints(_) | Semantic::Weights(_) | Semantic::Extras(_) => true,
+        Semantic::Joints(_) => {
+            shape == Type::Vec4 && small && accessor.is_unsigned() && !normalized
+        }
+        Semantic::Weights(_) => shape == Type::Vec4 && (float || small && accessor.is_unsigned()),
+        Semantic::Extras(_) => true,
     }
 }

@@ -2,8 +2,9 @@
 
 use super::accessors::Accessor;
 use super::attributes::Attributes;
-use super::document::{label, morph_targets};
+use super::document::label;
 use super::materials::{Materials, uv_sets};
+use super::posing::{Arrays, Hung, Pose, Poses};
 use super::{Output, Source};
 use crate::ingest::error::Fault;
 use crate::ingest::normals;
@@ -12,20 +13,30 @@ use glam::{Vec2, Vec3, Vec4};
 use gltf::json::mesh::{Mode, Primitive, Semantic};
 use gltf::json::validation::Checked;
 use gltf::json::{Index, Mesh as Row};
+use std::collections::HashMap;
 use std::rc::Rc;
 
 /// A texture set's number is its place in a list; honest files have two or three.
 const MOST_UV_SETS: u32 = 16;
 
-/// The meshes that were compiled, by their number in the file: one row a primitive, `None` for one
-/// without triangles.
+/// The meshes that were compiled, by their number in the file and how they are posed: one row a primitive, `None`
+/// for one without triangles.
 pub(super) struct Meshes {
-    compiled: Vec<Option<Rc<[Option<u32>]>>>,
+    compiled: HashMap<(usize, Pose), Rc<[Option<Compiled>]>>,
     materials: Materials,
 }
 
+/// A primitive in the scene.
+#[derive(Clone, Copy)]
+pub(super) struct Compiled {
+    /// The scene's number of the mesh.
+    pub mesh: u32,
+    /// Where it hangs; else at its node.
+    pub hung: Option<Hung>,
+}
+
 /// Vertices of a primitive that its triangles use.
-struct Vertices {
+pub(super) struct Vertices {
     /// Their numbers in the file, ascending; `None` is all of them.
     used: Option<Vec<u32>>,
     count: usize,
@@ -33,18 +44,19 @@ struct Vertices {
 
 impl Meshes {
     pub(super) fn new(source: &Source) -> Meshes {
-        let compiled = vec![None; source.document.meshes.len()];
-        Meshes { compiled, materials: Materials::new(source) }
+        Meshes { compiled: HashMap::new(), materials: Materials::new(source) }
     }
 
-    /// The scene's meshes for a mesh of the file.
+    /// The scene's meshes for a mesh of the file in a pose.
     pub(super) fn primitives(
         &mut self,
         source: &Source,
         output: &mut Output,
         number: Index<Row>,
-    ) -> Result<Rc<[Option<u32>]>, Fault> {
-        if let Some(known) = &self.compiled[number.value()] {
+        (poses, pose): (&Poses, &Pose),
+    ) -> Result<Rc<[Option<Compiled>]>, Fault> {
+        let key = (number.value(), pose.clone());
+        if let Some(known) = self.compiled.get(&key) {
             return Ok(known.clone());
         }
         let row = &source.document.meshes[number.value()];
@@ -55,15 +67,17 @@ impl Meshes {
                 1 => object.clone(),
                 _ => format!("{object}, primitive {i}"),
             };
-            let mesh = self.compile(source, output, primitive, &object)?;
-            compiled.push(mesh.map(|mesh| {
+            let mesh = self.compile(source, output, primitive, (poses, pose), &object)?;
+            compiled.push(mesh.map(|(mesh, hung)| {
                 let name = row.name.clone().unwrap_or(object);
                 output.scene.meshes.push(Mesh { name, ..mesh });
-                output.scene.meshes.len() as u32 - 1
+                Compiled { mesh: output.scene.meshes.len() as u32 - 1, hung }
             }));
         }
-        let compiled: Rc<[Option<u32>]> = compiled.into();
-        self.compiled[number.value()] = Some(compiled.clone());
+        let bytes = pose.byte_length() + (row.primitives.len() * size_of::<Compiled>()) as u64;
+        output.budget.take(bytes, || object)?;
+        let compiled: Rc<[Option<Compiled>]> = compiled.into();
+        self.compiled.insert(key, compiled.clone());
         Ok(compiled)
     }
 
@@ -93,8 +107,9 @@ impl Meshes {
         source: &Source,
         output: &mut Output,
         primitive: &Primitive,
+        (poses, pose): (&Poses, &Pose),
         object: &str,
-    ) -> Result<Option<Mesh>, Fault> {
+    ) -> Result<Option<(Mesh, Option<Hung>)>, Fault> {
         let category = category(source, primitive);
         let Checked::Valid(mode @ (Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan)) =
             primitive.mode
@@ -114,14 +129,6 @@ impl Meshes {
                 return Ok(None);
             }
         };
-        if morph_targets(primitive) > 0 {
-            let text = "morph targets are not read; drawn in its rest shape";
-            output.notes.add(Category::Animation, object, text);
-        }
-        if primitive.attributes.contains_key(&Checked::Valid(Semantic::Joints(0))) {
-            let text = "skins are not read; drawn in its rest pose";
-            output.notes.add(Category::Animation, object, text);
-        }
         let extensions = primitive.extensions.as_ref();
         if extensions.is_some_and(|e| e.others.contains_key("KHR_materials_variants")) {
             let text = "material variants are not read; drawn with the default";
@@ -189,16 +196,20 @@ impl Meshes {
         };
         if let Some(accessor) = attribute(Semantic::Normals, output) {
             mesh.normals = vertices.read(accessor, 0.0, finite);
-            normals::make_unit(&mut mesh);
         }
         if wants_tangents && let Some(accessor) = attribute(Semantic::Tangents, output) {
-            mesh.tangents = vertices.read(accessor, 1.0, unit_tangent);
-            // A mesh with tangents of no length has none that mean anything.
-            if mesh.tangents.iter().any(|tangent| !tangent.is_finite()) {
-                let text = "has tangents without a direction; derived from its texture set";
-                output.notes.add(Category::Geometry, object, text);
-                mesh.tangents.clear();
-            }
+            mesh.tangents = vertices.read(accessor, 1.0, Vec4::from_array);
+        }
+        let arrays =
+            Arrays { attributes: &attributes, vertices: &vertices, positions: positions.count };
+        let hung = poses.apply(source, output, (pose, &arrays), &mut mesh, object)?;
+        normals::make_unit(&mut mesh);
+        mesh.tangents.iter_mut().for_each(|tangent| *tangent = unit_tangent(*tangent));
+        // A mesh with tangents of no length has none that mean anything.
+        if mesh.tangents.iter().any(|tangent| !tangent.is_finite()) {
+            let text = "has tangents without a direction; derived from its texture set";
+            output.notes.add(Category::Geometry, object, text);
+            mesh.tangents.clear();
         }
         if let Some(accessor) = attribute(Semantic::Colors(0), output) {
             mesh.colors = vertices.read(accessor, 1.0, |color| {
@@ -227,7 +238,7 @@ impl Meshes {
                 }
             };
         }
-        Ok(Some(mesh))
+        Ok(Some((mesh, hung)))
     }
 }
 
@@ -269,7 +280,8 @@ impl Vertices {
         Vertices { count: used.len(), used: Some(used) }
     }
 
-    fn read<const N: usize, T>(
+    /// An array of the primitive, of these vertices.
+    pub(super) fn read<const N: usize, T>(
         &self,
         accessor: &Accessor,
         missing: f32,
@@ -284,8 +296,7 @@ impl Vertices {
 }
 
 /// Not finite if it has no length.
-fn unit_tangent(tangent: [f32; 4]) -> Vec4 {
-    let tangent = Vec4::from(tangent);
+fn unit_tangent(tangent: Vec4) -> Vec4 {
     let handedness = if tangent.w < 0.0 { -1.0 } else { 1.0 };
     tangent.truncate().try_normalize().unwrap_or(Vec3::NAN).extend(handedness)
 }

@@ -1,16 +1,19 @@
 //! Nodes, parents first, and what stands at them.
 
+use super::animation::{self, Animated};
 use super::document::{Real, Transform, UsdFog, UsdLux, label, usd_path};
-use super::geometry::Meshes;
+use super::geometry::{Compiled, Meshes};
 use super::lights::{self, Placed};
 use super::links::LinkTable;
+use super::posing::{Hung, Pose, Poses};
 use super::profiles::Profiles;
-use super::{Output, Source, animation, cameras, fog, instancing};
+use super::{Output, Source, cameras, fog, instancing};
 use crate::ingest::error::Fault;
 use crate::ingest::paths::{PrimPaths, component};
 use crate::scene::{Category, Channel, Instance, Light, Links, Node, Trs};
 use glam::{DAffine3, DMat4, DQuat, DVec3};
 use gltf::json::{Index, Mesh, Node as Row};
+use std::collections::HashMap;
 use std::mem;
 
 /// How far a scale may be from uniform for a sphere to stay a sphere.
@@ -29,6 +32,12 @@ struct Open {
     visible: bool,
 }
 
+/// An instance that is to hang elsewhere than at the node where it stands.
+struct Hanging {
+    instance: u32,
+    hung: Hung,
+}
+
 /// What grows while the hierarchy is walked.
 struct Walk<'a> {
     source: &'a Source<'a>,
@@ -36,6 +45,9 @@ struct Walk<'a> {
     /// For each node of the file where it was placed first.
     placed: Vec<Option<u32>>,
     meshes: Meshes,
+    poses: Poses,
+    /// Instances of skinned meshes, which stand at their nodes until all nodes are placed.
+    hanging: Vec<Hanging>,
     paths: PrimPaths,
     links: LinkTable,
     profiles: Profiles,
@@ -45,9 +57,12 @@ struct Walk<'a> {
 
 /// Compiles the nodes of the file's scene and everything at them.
 pub(super) fn compile(source: &Source, output: &mut Output) -> Result<(), Fault> {
+    let Animated { channels, weights } = animation::compile(source, output)?;
     let mut walk = Walk {
         source,
-        channels: animation::compile(source, output)?,
+        poses: Poses::new(source, output, &channels, weights)?,
+        channels,
+        hanging: Vec::new(),
         placed: vec![None; source.document.nodes.len()],
         meshes: Meshes::new(source),
         paths: PrimPaths::default(),
@@ -79,6 +94,7 @@ pub(super) fn compile(source: &Source, output: &mut Output) -> Result<(), Fault>
         let children = source.forest.children(number).iter().rev();
         stack.extend(children.map(|&child| open(child, Some(node), visible)));
     }
+    walk.hang(output)?;
     walk.links.finish(output)
 }
 
@@ -183,9 +199,20 @@ impl Walk<'_> {
         let (lux, values) = (lux.as_ref(), values.as_ref());
         let visibility = lights::visibility(lux);
         let placed = Placed { lux, shaping, values, forced, visibility, links, has_light, object };
+        let pose = self.poses.of(self.source, output, (number, row), mesh)?;
         let Some(instances) = instances else {
-            return self.put_mesh(output, mesh, node, &placed);
+            if pose.is_skinned() && self.placed[number] != Some(node) {
+                let text = "is skinned; it is drawn once, where its joints are";
+                output.notes.add(Category::Animation, object, text);
+                return Ok(());
+            }
+            return self.put_mesh(output, mesh, node, &placed, &pose);
         };
+        if pose.is_skinned() {
+            let text = "is skinned and has instances; they are drawn in its rest pose";
+            output.notes.add(Category::Animation, object, text);
+        }
+        let pose = pose.without_skin();
         let locals = match instancing::transforms(self.source, output, instances, object)? {
             Ok(locals) => locals,
             Err(problem) => {
@@ -199,7 +226,8 @@ impl Walk<'_> {
             let path = format!("{}[{i}]", output.scene.nodes[node as usize].path);
             let child = self.push(output, Node::fixed(path, Some(node), local))?;
             // The light of a node is not its instances'.
-            self.put_mesh(output, mesh, child, &Placed { has_light: false, ..placed })?;
+            let placed = Placed { has_light: false, ..placed };
+            self.put_mesh(output, mesh, child, &placed, &pose)?;
         }
         Ok(())
     }
@@ -211,6 +239,7 @@ impl Walk<'_> {
         mesh: Index<Mesh>,
         node: u32,
         placed: &Placed,
+        pose: &Pose,
     ) -> Result<(), Fault> {
         if let Some(radius) = placed.sphere_radius()? {
             let material = self.meshes.only_material(self.source, output, mesh);
@@ -228,11 +257,12 @@ impl Walk<'_> {
                 "its sphere is stretched or textured; sampled as the triangles that stand for it";
             output.notes.add(Category::Lights, placed.object, text);
         }
-        let compiled = self.meshes.primitives(self.source, output, mesh)?;
+        let pose = (&self.poses, pose);
+        let compiled = self.meshes.primitives(self.source, output, mesh, pose)?;
         let mesh_number = mesh.value();
         let row = &self.source.document.meshes[mesh_number];
-        for (i, &mesh) in compiled.iter().enumerate() {
-            let Some(mesh) = mesh else { continue };
+        for (i, compiled) in compiled.iter().enumerate() {
+            let Some(Compiled { mesh, hung }) = *compiled else { continue };
             let above = output.scene.nodes[node as usize].path.clone();
             // A lone mesh is the node's prim; several, or one beside a light, are below it.
             let own = usd_path(&row.primitives[i].extras);
@@ -255,15 +285,55 @@ impl Walk<'_> {
             let above = links.membership;
             let membership = self.links.of_primitive(output, primitive, above, placed.object)?;
             self.links.add_instance(output, Links { membership, ..links })?;
+            if let Some(hung) = hung {
+                hung.note(output, placed.object);
+                let bytes = size_of::<Hanging>() as u64;
+                output.budget.take(bytes, || placed.object.to_string())?;
+                let instance = output.scene.instances.len() as u32;
+                self.hanging.push(Hanging { instance, hung });
+            }
             let lit = Instance { path, node, mesh, values, shaping, forced, visibility };
             output.scene.instances.push(lit);
         }
         Ok(())
     }
+
+    /// Hangs skinned meshes where their joints say, at nodes of their own.
+    fn hang(&mut self, output: &mut Output) -> Result<(), Fault> {
+        let mut known = HashMap::new();
+        for Hanging { instance, hung } in mem::take(&mut self.hanging) {
+            let from = output.scene.instances[instance as usize].node;
+            let key = (from, hung.below);
+            let node = match known.get(&key) {
+                Some(&node) => node,
+                None => {
+                    let path = format!("{}/posed", output.scene.nodes[from as usize].path);
+                    let parent = hung.below.and_then(|row| self.placed[row]);
+                    let node = self.push(output, Node::fixed(path, parent, Trs::default()))?;
+                    keep_group(output, from, node)?;
+                    *known.entry(key).or_insert(node)
+                }
+            };
+            output.scene.instances[instance as usize].node = node;
+        }
+        Ok(())
+    }
+}
+
+/// Puts a node into the light group of another, if that is in one.
+fn keep_group(output: &mut Output, of: u32, node: u32) -> Result<(), Fault> {
+    let scene = &mut output.scene;
+    let mut above = std::iter::successors(Some(of), |&node| scene.nodes[node as usize].parent);
+    if let Some(group) = above.find_map(|node| scene.light_groups.get(&node)).cloned() {
+        let bytes = size_of::<(u32, String)>() + group.len();
+        output.budget.take(bytes as u64, || scene.nodes[node as usize].path.clone())?;
+        scene.light_groups.insert(node, group);
+    }
+    Ok(())
 }
 
 /// The transform of a node. Whatever it says can be composed; what had to be mended is noted.
-fn local(row: &Transform, mut note: impl FnMut(&'static str)) -> Trs {
+pub(super) fn local(row: &Transform, mut note: impl FnMut(&'static str)) -> Trs {
     if let Some(matrix) = row.matrix {
         let columns = matrix.map(|value| value.f64());
         let last_row = [columns[3], columns[7], columns[11], columns[15] - 1.0];

@@ -14,6 +14,7 @@
 //! | `buffers`, `accessors` | arrays in the buffers |
 //! | `hierarchy` | nodes, parents first, and what stands at them |
 //! | `instancing`, `geometry`, `attributes` | meshes |
+//! | `posing` | skins and morph targets |
 //! | `materials`, `glossiness`, `textures` | surfaces |
 //! | `lights`, `fog`, `cameras`, `animation` | what they say |
 //! | `links` | which lights light what |
@@ -35,6 +36,7 @@ mod instancing;
 mod lights;
 mod links;
 mod materials;
+mod posing;
 mod profiles;
 mod textures;
 

@@ -157,8 +157,16 @@ pub(super) fn scene(row: &mut Row) -> Prepared {
     Ok(())
 }
 
+/// What is called a skeleton decides nothing, and some writers number one that is not there. The crate cannot do
+/// without joints.
+pub(super) fn skin(row: &mut Row) -> Prepared {
+    row.remove("skeleton");
+    row.entry("joints").or_insert_with(|| json!([]));
+    Ok(())
+}
+
 /// The crate takes all attributes with odd names for one, and ignores those of morph targets. They
-/// become the application's own: they are not read, but checked like the others.
+/// become the application's own, `target 0 NORMAL` of the first target.
 pub(super) fn mesh(row: &mut Row) -> Prepared {
     for primitive in rows(row, "primitives") {
         if primitive.get("mode").and_then(Value::as_u64).is_some_and(|mode| mode > 6) {

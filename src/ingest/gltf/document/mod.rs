@@ -96,6 +96,7 @@ impl Document {
         let camera = Kind("camera", Category::Cameras, r#"{"type": "none"}"#);
         let animation =
             Kind("animation", Category::Animation, r#"{"channels": [], "samplers": []}"#);
+        let skin = Kind("skin", Category::Animation, r#"{"joints": []}"#);
         let scene = Kind("scene", Category::Geometry, r#"{"nodes": []}"#);
         let plain = |_: &mut Row, _| Ok(());
         let root = Root {
@@ -118,6 +119,7 @@ impl Document {
             images: tables.table("images", &image, plain)?,
             samplers: tables.table("samplers", &sampler, plain)?,
             cameras: tables.table("cameras", &camera, |row, i| beside.camera(row, i))?,
+            skins: tables.table("skins", &skin, |row, _| beside::skin(row))?,
             animations: tables
                 .table("animations", &animation, |row, i| beside.animation(row, i))?,
             ..Root::default()

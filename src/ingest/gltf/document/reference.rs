@@ -6,7 +6,7 @@ use serde_json::Value;
 /// Members that refer to other objects: one, a list, or by name.
 const MEMBERS: [&[&str]; 4] = [
     &["buffer", "bufferView", "indices", "inverseBindMatrices"],
-    &["camera", "children", "joints", "light", "mesh", "nodes", "skeleton", "skin"],
+    &["camera", "children", "joints", "light", "mesh", "nodes", "skin"],
     &["index", "material", "sampler", "source"],
     &["attributes", "input", "node", "output", "targets"],
 ];

@@ -1,0 +1,130 @@
+//! Where joints are at the first frame.
+
+use crate::ingest::error::Fault;
+use crate::ingest::gltf::hierarchy::local;
+use crate::ingest::gltf::{Output, Source};
+use crate::scene::{Channel, Node};
+use glam::DAffine3;
+use std::collections::{HashMap, HashSet};
+
+/// The joints of all skins and the nodes above them, by their numbers in the file. Of a node with several
+/// parents it is the one that is placed first.
+#[derive(Default)]
+pub(super) struct Rig {
+    nodes: HashMap<usize, Joint>,
+}
+
+struct Joint {
+    parent: Option<usize>,
+    /// How many nodes are above it.
+    depth: u32,
+    /// To its parent, at the first frame.
+    local: DAffine3,
+    /// Whether that is ever another.
+    moves: bool,
+}
+
+impl Rig {
+    pub(super) fn new(
+        source: &Source,
+        output: &mut Output,
+        channels: &[Vec<Channel>],
+    ) -> Result<Rig, Fault> {
+        let document = source.document;
+        if document.skins.is_empty() {
+            return Ok(Rig::default());
+        }
+        let rows = document.nodes.len();
+        // A parent and a visit of each node; and of some of them a joint, in a map that is half empty.
+        let bytes = rows * (size_of::<(Option<usize>, bool, usize)>() + 2 * size_of::<Joint>());
+        output.budget.take(bytes as u64, || "skins".to_string())?;
+        let parents = parents(source);
+        let timeline = output.scene.timeline;
+        let first_s = timeline.seconds_at(timeline.first_frame);
+        let mut rig = Rig::default();
+        let joints = document.skins.iter().flat_map(|skin| &skin.joints);
+        for joint in joints.map(|joint| joint.value()) {
+            // From the joint up to what is there already, then down again.
+            let mut path = Vec::new();
+            let mut next = parents.get(&joint).map(|_| joint);
+            while let Some(row) = next.filter(|row| !rig.nodes.contains_key(row)) {
+                path.push(row);
+                next = parents[&row];
+            }
+            for row in path.into_iter().rev() {
+                let parent = parents[&row];
+                let mut node =
+                    Node::fixed("", None, local(&document.beside.transforms[row], |_| {}));
+                node.channels = channels[row].clone();
+                node.settle();
+                let joint = Joint {
+                    parent,
+                    depth: parent.map_or(0, |parent| rig.nodes[&parent].depth + 1),
+                    local: node.to_parent(first_s, timeline),
+                    moves: !node.channels.is_empty(),
+                };
+                rig.nodes.insert(row, joint);
+            }
+        }
+        Ok(rig)
+    }
+
+    /// Whether a node is in the scene.
+    pub(super) fn has(&self, node: usize) -> bool {
+        self.nodes.contains_key(&node)
+    }
+
+    /// The deepest node that is each of two or above it; `None` is the world. All of the rig.
+    pub(super) fn meet(&self, a: Option<usize>, b: Option<usize>) -> Option<usize> {
+        let (mut a, mut b) = (a, b);
+        while a != b {
+            let depth = |node: Option<usize>| node.map(|node| self.nodes[&node].depth);
+            let deeper = if depth(a) >= depth(b) { &mut a } else { &mut b };
+            *deeper = deeper.and_then(|node| self.nodes[&node].parent);
+        }
+        a
+    }
+
+    /// The node itself, or the next one above it that is not among some.
+    pub(super) fn above(&self, node: Option<usize>, joints: &HashSet<usize>) -> Option<usize> {
+        let mut node = node;
+        while let Some(joint) = node.filter(|joint| joints.contains(joint)) {
+            node = self.nodes[&joint].parent;
+        }
+        node
+    }
+
+    /// The nodes from one up to another that is above it, without that one; all of them, if it is `None`.
+    fn path(&self, node: usize, below: Option<usize>) -> impl Iterator<Item = &Joint> {
+        let own = move |node: Option<usize>| {
+            node.filter(|_| node != below).map(|node| &self.nodes[&node])
+        };
+        std::iter::successors(own(Some(node)), move |joint| own(joint.parent))
+    }
+
+    /// From a node to another above it, or to the world, at the first frame.
+    pub(super) fn transform(&self, node: usize, to: Option<usize>) -> DAffine3 {
+        self.path(node, to).fold(DAffine3::IDENTITY, |below, joint| joint.local * below)
+    }
+
+    /// Whether a node ever moves against another above it.
+    pub(super) fn moves(&self, node: usize, against: Option<usize>) -> bool {
+        self.path(node, against).any(|joint| joint.moves)
+    }
+}
+
+/// For each node of the scene its parent, by which it is reached first.
+fn parents(source: &Source) -> HashMap<usize, Option<usize>> {
+    let mut parents = HashMap::new();
+    let mut open: Vec<(usize, Option<usize>)> =
+        source.forest.roots.iter().rev().map(|&root| (root, None)).collect();
+    while let Some((node, parent)) = open.pop() {
+        if parents.contains_key(&node) {
+            continue;
+        }
+        parents.insert(node, parent);
+        let children = source.forest.children(node).iter().rev();
+        open.extend(children.map(|&child| (child, Some(node))));
+    }
+    parents
+}
