@@ -3,7 +3,7 @@
 use crate::emitter::{Emitters, LightEntry};
 use crate::light_tree::{FrameRow, InstanceRow, MeanRow, TextureRow};
 use crate::render::kept_in_own_space;
-use crate::scene::{Material, Requirements, Scene, Texture};
+use crate::scene::{Requirements, Scene, Texture};
 use glam::Vec2;
 use serde::Serialize;
 
@@ -145,7 +145,7 @@ fn lights(needs: &Requirements, emitters: &Emitters) -> Vec<Feature> {
 }
 
 fn surfaces(scene: &Scene, needs: &Requirements, emitters: &Emitters) -> Vec<Feature> {
-    let textured = scene.materials.iter().filter(|material| is_textured(material)).count();
+    let textured = scene.materials.iter().filter(|m| m.textures().next().is_some()).count();
     let on_emitters = emitters.texture_means().len() + needs.pictured_domes;
     let users = textured + on_emitters;
     let kept = kept_in_own_space(scene);
@@ -174,6 +174,8 @@ fn surfaces(scene: &Scene, needs: &Requirements, emitters: &Emitters) -> Vec<Fea
         Feature::new("cut-out materials", needs.cutouts).with("rays ask at every hit on one"),
         Feature::new("glossy materials", needs.glossy)
             .with("their lobes are part of the importance"),
+        Feature::new("clear coats", needs.coats)
+            .with("the brighter peak, its or that of what is below, is part of the importance"),
         Feature::new("meshes shared by instances", needs.shared_meshes).used_by(
             kept_shared,
             "of those that are large, rays search one set of triangles in its own space",
@@ -193,17 +195,6 @@ fn motion(needs: &Requirements, emitters: &Emitters, frames: usize) -> Vec<Featu
             .with("rows of frames, in the tree file, beside a tree for each that is unlike the others")
             .taking(frames * each),
     ]
-}
-
-fn is_textured(material: &Material) -> bool {
-    let uses = [
-        material.base_color_texture,
-        material.metallic_roughness_texture,
-        material.specular_texture,
-        material.specular_color_texture,
-        material.normal_texture,
-    ];
-    uses.iter().any(Option::is_some)
 }
 
 /// How many texture coordinates its meshes have.

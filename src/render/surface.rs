@@ -126,12 +126,21 @@ impl<'a> Surfaces<'a> {
         let tint = self.lookup(at, &material.specular_color_texture).truncate();
         let reflected = ((material.ior - 1.0) / (material.ior + 1.0)).powi(2);
         let f0 = (reflected * material.specular_color * tint).min(Rgb::ONE);
+        let (coat, coat_roughness) = match &material.coat {
+            None => (0.0, 0.0),
+            Some(coat) => (
+                coat.factor * self.lookup(at, &coat.factor_texture).x,
+                coat.roughness * self.lookup(at, &coat.roughness_texture).y,
+            ),
+        };
         SurfaceSample {
             base_color: material.base_color * base.truncate(),
             metallic: material.metallic * rough_metal.z,
             roughness: material.roughness * rough_metal.y,
             dielectric_f0: f0 * specular,
             dielectric_f90: specular,
+            coat,
+            coat_roughness,
         }
     }
 

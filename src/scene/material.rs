@@ -32,6 +32,8 @@ pub struct Material {
     pub specular_color: Rgb,
     /// sRGB texture of the tint.
     pub specular_color_texture: Option<TextureUse>,
+    /// A clear coat above all of that, if it has one.
+    pub coat: Option<Coat>,
     /// Tangent-space normals, linear.
     pub normal_texture: Option<TextureUse>,
     /// Scale of the normal map's x and y.
@@ -42,6 +44,20 @@ pub struct Material {
     pub emission_texture: Option<TextureUse>,
     /// Emission leaves from both sides. Reflection always does.
     pub double_sided: bool,
+}
+
+/// A layer that reflects like a dielectric of index 1.5 and lets through what it does not reflect
+/// (`KHR_materials_clearcoat`). It does not darken the emission below it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Coat {
+    /// Its strength, above 0 and at most 1.
+    pub factor: f32,
+    /// Linear texture: red multiplies the factor.
+    pub factor_texture: Option<TextureUse>,
+    /// Perceptual roughness; GGX alpha is its square.
+    pub roughness: f32,
+    /// Linear texture: green multiplies the roughness.
+    pub roughness_texture: Option<TextureUse>,
 }
 
 /// What coverage means.
@@ -73,6 +89,7 @@ impl Default for Material {
             specular_texture: None,
             specular_color: Rgb::ONE,
             specular_color_texture: None,
+            coat: None,
             normal_texture: None,
             normal_scale: 1.0,
             emission_nits: Rgb::ZERO,
@@ -85,7 +102,20 @@ impl Default for Material {
 impl Material {
     /// Whether it has a specular lobe. Without one it is Lambertian.
     pub fn is_glossy(&self) -> bool {
-        self.specular > 0.0 || self.metallic > 0.0
+        self.specular > 0.0 || self.metallic > 0.0 || self.coat.is_some()
+    }
+
+    /// The textures of its reflection, those that are there.
+    pub fn textures(&self) -> impl Iterator<Item = TextureUse> {
+        let coat = self.coat.map(|coat| [coat.factor_texture, coat.roughness_texture]);
+        let uses = [
+            self.base_color_texture,
+            self.metallic_roughness_texture,
+            self.specular_texture,
+            self.specular_color_texture,
+            self.normal_texture,
+        ];
+        uses.into_iter().chain(coat.into_iter().flatten()).flatten()
     }
 
     /// Whether any light can leave this surface of its own.

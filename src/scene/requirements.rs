@@ -48,6 +48,8 @@ pub struct Requirements {
     pub normal_maps: usize,
     /// Materials with a specular lobe, and one for all meshes without a material.
     pub glossy: usize,
+    /// Materials with a clear coat.
+    pub coats: usize,
     /// Images.
     pub textures: usize,
     /// Homogeneous fog, 0 or 1.
@@ -120,6 +122,7 @@ impl Requirements {
             needs.cutouts += usize::from(material.alpha_mode != AlphaMode::Opaque);
             needs.normal_maps += usize::from(material.normal_texture.is_some());
             needs.glossy += usize::from(material.is_glossy());
+            needs.coats += usize::from(material.coat.is_some());
         }
         needs.glossy += usize::from(scene.meshes.iter().any(|mesh| mesh.material.is_none()));
         needs.fog = usize::from(scene.medium.is_some());

@@ -192,7 +192,7 @@ fn materials_are_compiled() {
         "extensions": {
             "KHR_materials_ior": {"ior": 1.33},
             "KHR_materials_specular": {"specularFactor": 0.5, "specularColorFactor": [1, 0.5, 2]},
-            "KHR_materials_clearcoat": {},
+            "KHR_materials_sheen": {},
         },
     });
     let scene = file.load().unwrap();
@@ -203,7 +203,7 @@ fn materials_are_compiled() {
     assert_eq!((material.specular, material.specular_color), (0.5, Vec3::new(1.0, 0.5, 2.0)));
     assert!(material.double_sided && !material.emits());
     let told: Vec<String> = scene.notes.iter().map(ToString::to_string).collect();
-    assert_eq!(told, ["materials: material 0: KHR_materials_clearcoat is not read"]);
+    assert_eq!(told, ["materials: material 0: KHR_materials_sheen is not read"]);
 }
 
 #[test]

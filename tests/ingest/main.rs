@@ -1,6 +1,7 @@
 //! Files in, a scene index out.
 
 mod cameras;
+mod coat;
 mod corpus;
 mod files;
 mod fog;

@@ -22,8 +22,16 @@ fn surface() -> impl Strategy<Value = (Bsdf, Glossy)> {
         |(any, base, metallic, roughness)| {
             let base_color = Rgb::splat(base);
             let (dielectric_f0, dielectric_f90) = (Rgb::splat(0.04), 1.0);
-            let sample =
-                SurfaceSample { base_color, metallic, roughness, dielectric_f0, dielectric_f90 };
+            let (coat, coat_roughness) = (0.0, 0.0);
+            let sample = SurfaceSample {
+                base_color,
+                metallic,
+                roughness,
+                dielectric_f0,
+                dielectric_f90,
+                coat,
+                coat_roughness,
+            };
             let bsdf = Bsdf::new(&sample, Frame::around(any.receiver.normal));
             let lobes = bsdf.toward(any.to_eye).lobes()?;
             Some((bsdf, Glossy { lobes, ..any }))
@@ -73,10 +81,29 @@ proptest! {
     }
 }
 
-/// Small lamps over a surface like wet stone: the exact variance of a pick by what the surface reflects,
+/// Small lamps over a surface like wet stone, and over one like a painted car: the exact variance of a pick by what the surface reflects,
 /// and by its irradiance alone.
 #[test]
 fn a_reflection_is_found() {
+    let stone = SurfaceSample {
+        base_color: Rgb::splat(0.2),
+        metallic: 0.0,
+        roughness: 0.15,
+        dielectric_f0: Rgb::splat(0.04),
+        dielectric_f90: 1.0,
+        coat: 0.0,
+        coat_roughness: 0.0,
+    };
+    let paint = SurfaceSample { roughness: 0.6, coat: 1.0, coat_roughness: 0.15, ..stone };
+    for sample in [stone, paint] {
+        let (knowing, blind) = variances(&sample);
+        println!("relative variance: {knowing:.4} knowing the surface, {blind:.4} not");
+        assert!(knowing < 0.1 * blind, "{knowing} {blind} of {sample:?}");
+    }
+}
+
+/// Of a pick by what a surface reflects, and by its irradiance.
+fn variances(sample: &SurfaceSample) -> (f64, f64) {
     let random = |i: u32, n: u32| candelabra::math::random::hash(i, n) as f32 / u32::MAX as f32;
     let lamps: Vec<LightBounds> = (0..2000)
         .map(|i| {
@@ -84,14 +111,7 @@ fn a_reflection_is_found() {
             point_light(at * 40.0, 0.5 + random(i, 3))
         })
         .collect();
-    let sample = SurfaceSample {
-        base_color: Rgb::splat(0.2),
-        metallic: 0.0,
-        roughness: 0.15,
-        dielectric_f0: Rgb::splat(0.04),
-        dielectric_f90: 1.0,
-    };
-    let bsdf = Bsdf::new(&sample, Frame::around(Vec3::Y));
+    let bsdf = Bsdf::new(sample, Frame::around(Vec3::Y));
     let default = Splitting { knob: 0.5, most: 64, test: SplitTest::Variance };
     let (mut knowing, mut blind) = (0.0, 0.0);
     with_tree(&lamps, |tree| {
@@ -116,10 +136,5 @@ fn a_reflection_is_found() {
             blind += b.variance / (b.mean * b.mean);
         }
     });
-    println!(
-        "relative variance: {:.4} knowing the surface, {:.4} not",
-        knowing / 40.0,
-        blind / 40.0
-    );
-    assert!(knowing < 0.1 * blind, "{knowing} {blind}");
+    (knowing / 40.0, blind / 40.0)
 }

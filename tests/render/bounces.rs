@@ -1,7 +1,7 @@
 //! Many bounces: furnaces, where a white thing cannot be told from its surroundings, and closed
 //! rooms, whose light is a geometric series.
 
-use crate::stage::{Stage, at, direct, facing, glow, lambert};
+use crate::stage::{Stage, at, coat, direct, facing, glow, lambert};
 use crate::statistics::{Estimate, assert_even, pixels};
 use candelabra::render::buffers::RenderBuffers;
 use candelabra::render::{RenderDelegate, RenderSettings};
@@ -30,6 +30,10 @@ fn white_things() -> Vec<(String, Material, [f64; 2])> {
     }
     let glass = Material { ior: 2.4, roughness: 0.3, ..Default::default() };
     things.push(("diamond".into(), glass, [4e-3, 3e-2]));
+    for (metallic, factor, roughness) in [(0.0, 1.0, 0.1), (1.0, 0.7, 0.5)] {
+        let thing = Material { metallic, coat: coat(factor, roughness), ..Default::default() };
+        things.push((format!("coat of roughness {roughness}"), thing, [4e-3, 3e-2]));
+    }
     things
 }
 

@@ -3,7 +3,7 @@
 //! All are seen in the same way: from above, floor only, so that no light is in the picture and
 //! its mean is reflected light alone. A wall stands behind, a card throws a shadow.
 
-use crate::stage::{Stage, aimed, at, facing, glow, lambert, picture, scaled};
+use crate::stage::{Stage, aimed, at, coat, facing, glow, lambert, picture, scaled};
 use candelabra::scene::{
     AlphaMode, IesProfile, IesTable, LightKind, Material, Node, Pixels, Pole, Shaping, Texture,
     TextureUse, Wrap,
@@ -299,11 +299,14 @@ pub fn of_every_material() -> Vec<Room> {
         ..Default::default()
     };
     let varnish = Material { roughness: 0.4, ..Material { specular: 1.0, ..plaster() } };
+    let paint = |factor, roughness| Material { coat: coat(factor, roughness), ..plaster() };
     vec![
         Room { name: "Lambert".into(), stage: lambert_room(), depth: 2 },
         room("rough metal", metal(0.8), some_lights),
         room("smooth metal", metal(0.4), some_lights),
         room("varnish", varnish, some_lights),
+        room("a coat on plaster", paint(1.0, 0.3), some_lights),
+        room("a thin coat on metal", Material { coat: coat(0.5, 0.4), ..metal(0.7) }, some_lights),
         room("masked cut-outs", plaster(), |stage| cut_outs(stage, AlphaMode::Mask(0.5))),
         room("blended cut-outs", plaster(), |stage| cut_outs(stage, AlphaMode::Blend)),
         room("a normal map", plaster(), |stage| {

@@ -9,8 +9,8 @@ use candelabra::pipeline;
 use candelabra::render::buffers::RenderBuffers;
 use candelabra::render::{LightStrategy, RenderDelegate, RenderSettings};
 use candelabra::scene::{
-    Camera, Instance, Light, LightKind, Material, Mesh, Node, Pixels, Scene, Texture, TextureUse,
-    Trs, Wrap,
+    Camera, Coat, Instance, Light, LightKind, Material, Mesh, Node, Pixels, Scene, Texture,
+    TextureUse, Trs, Wrap,
 };
 use candelabra::store::AlignedBytes;
 use glam::{DQuat, DVec3, Vec2, Vec3};
@@ -60,6 +60,11 @@ pub fn scaled(place: Trs, by: impl Into<DVec3>) -> Trs {
 /// A surface that reflects like Lambert's and nothing else.
 pub fn lambert(albedo: impl Into<Vec3>) -> Material {
     Material { base_color: albedo.into(), specular: 0.0, ..Default::default() }
+}
+
+/// What a material is coated with.
+pub fn coat(factor: f32, roughness: f32) -> Option<Coat> {
+    Some(Coat { factor, factor_texture: None, roughness, roughness_texture: None })
 }
 
 /// A black surface that shines from its front.

@@ -5,12 +5,11 @@
 //! emission, which would be far too bright without its texture.
 
 use super::document::label;
-use super::glossiness;
 use super::textures::Textures;
-use super::{Output, Source};
+use super::{Output, Source, coat, glossiness};
 use crate::ingest::image::{Coding, MISSING_REFLECTANCE};
 use crate::math::color::Rgb;
-use crate::scene::{AlphaMode, Category, Material, TextureUse};
+use crate::scene::{AlphaMode, Category, Material};
 use gltf::json::material::AlphaMode as RowAlphaMode;
 use gltf::json::texture::Info;
 use gltf::json::validation::Checked;
@@ -122,7 +121,16 @@ impl Materials {
         }
         self.emit(source, output, number, &object, &mut material);
         self.add_textures(source, output, number, &object, &mut material);
-        for extension in extensions.others.keys() {
+        if let Some(extension) = extensions.others.get(coat::NAME) {
+            let map = source.document.beside.normal_maps[number].as_ref();
+            let told = (extension, map);
+            material.coat = coat::compile(&mut self.textures, source, output, told, &object);
+            if material.coat.is_some() && material.emits() {
+                let text = "its coat does not darken its light";
+                output.notes.add(Category::Lights, &*object, text);
+            }
+        }
+        for extension in extensions.others.keys().filter(|name| *name != coat::NAME) {
             let text = match extension.as_str() {
                 "KHR_materials_unlit" => "is unlit; drawn as a surface that light falls on".into(),
                 extension => format!("{extension} is not read"),
@@ -232,13 +240,5 @@ impl Materials {
 
 /// The texture sets that a material's textures are looked up by.
 pub(super) fn uv_sets(material: &Material) -> impl Iterator<Item = u32> {
-    let uses: [Option<TextureUse>; 6] = [
-        material.base_color_texture,
-        material.metallic_roughness_texture,
-        material.specular_texture,
-        material.specular_color_texture,
-        material.normal_texture,
-        material.emission_texture,
-    ];
-    uses.into_iter().flatten().map(|usage| usage.uv_set)
+    material.textures().chain(material.emission_texture).map(|usage| usage.uv_set)
 }

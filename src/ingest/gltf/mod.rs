@@ -15,7 +15,7 @@
 //! | `hierarchy` | nodes, parents first, and what stands at them |
 //! | `instancing`, `geometry`, `attributes` | meshes |
 //! | `posing` | skins and morph targets |
-//! | `materials`, `glossiness`, `textures` | surfaces |
+//! | `materials`, `glossiness`, `coat`, `textures` | surfaces |
 //! | `lights`, `fog`, `cameras`, `animation` | what they say |
 //! | `links` | which lights light what |
 
@@ -24,6 +24,7 @@ mod animation;
 mod attributes;
 mod buffers;
 mod cameras;
+mod coat;
 mod container;
 mod document;
 mod extensions;

@@ -1,4 +1,4 @@
-//! How a surface reflects: Lambert below GGX, glTF's metallic-roughness model.
+//! How a surface reflects: Lambert below GGX, glTF's metallic-roughness model, perhaps below a clear coat.
 //!
 //! A [`Bsdf`] is one shading point, with textures already looked up into a [`SurfaceSample`]; a
 //! [`Reflection`] is that point seen from one direction, `wo`.
@@ -10,14 +10,18 @@
 //! directional albedo `E = a + b` from [`albedo`]:
 //!
 //! ```text
-//! f   = m f_metal + (1 - m) (f_coat + diffuse)
-//! f_x = D G2 / (4 cos_o cos_i) * F_x * (1 + F0_x (1 - E) / E)     Turquin 2019, eq. 16
-//! diffuse = base / pi * (1 - albedo of f_coat toward wo)
+//! f   = c f_coat + (1 - c * albedo of f_coat toward wo) f_base
+//! f_base  = m f_metal + (1 - m) (f_gloss + diffuse)
+//! f_x     = D G2 / (4 cos_o cos_i) * F_x * (1 + F0_x (1 - E) / E)     Turquin 2019, eq. 16
+//! diffuse = base / pi * (1 - albedo of f_gloss toward wo)
 //! ```
 //!
-//! So a white metal and a white dielectric both reflect exactly what arrives (up to the table's
-//! interpolation), and `specular = 0` is exactly `base / pi`. The compensation and the diffuse
-//! scale look at `wo` alone: only Lambert and a lossless GGX (`alpha -> 0`) are reciprocal.
+//! The coat is `KHR_materials_clearcoat`'s: `c` its strength, an index of 1.5, a roughness of its own. Where it is
+//! smooth, its albedo is Fresnel's term at `wo`, by which the extension darkens what is below.
+//!
+//! So a white metal and a white dielectric, coated or not, reflect exactly what arrives (up to the table's
+//! interpolation), and `specular = 0` is exactly `base / pi`. The compensation and what is below another
+//! lobe look at `wo` alone: only Lambert and a lossless GGX (`alpha -> 0`) are reciprocal.
 
 pub mod albedo;
 pub mod ggx;
@@ -35,6 +39,9 @@ use std::f32::consts::FRAC_1_PI;
 /// that a mirror stays a finite lobe that next-event estimation can hit.
 pub const ALPHA_MIN: f32 = 1e-3;
 
+/// What a coat reflects at normal incidence: its index is 1.5.
+const COAT_F0: f32 = 0.04;
+
 /// A material at one point, textures looked up.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SurfaceSample {
@@ -50,6 +57,10 @@ pub struct SurfaceSample {
     /// The dielectric's reflectance at grazing incidence (`KHR_materials_specular`: its
     /// `specular`). With this and `dielectric_f0` at 0 the surface is Lambertian.
     pub dielectric_f90: f32,
+    /// Strength of the coat; 0 is none.
+    pub coat: f32,
+    /// Perceptual roughness of the coat.
+    pub coat_roughness: f32,
 }
 
 /// A reflecting point. Directions are unit, world space, and point away from the surface.
@@ -62,6 +73,8 @@ pub struct Bsdf {
     dielectric_f90: f32,
     metallic: f32,
     alpha: f32,
+    coat: f32,
+    coat_alpha: f32,
 }
 
 /// A direction drawn by [`Reflection::sample`].
@@ -90,6 +103,31 @@ pub struct Reflection {
     /// Probability of choosing the specular lobe; `None` if nothing is reflected: `wo` is below the
     /// horizon, or the surface is black.
     specular_probability: Option<f32>,
+    coat: Coat,
+}
+
+/// The coat's lobe. Its colour is `strength * (F0 + (1 - F0) * (1 - cos_h)^5)`.
+#[derive(Clone, Copy, Debug, Default)]
+struct Coat {
+    /// 0 is no coat.
+    strength: f32,
+    alpha: f32,
+    /// Of choosing it.
+    probability: f32,
+}
+
+impl Coat {
+    /// Its reflectance toward a direction, and the lobe with the probability still open.
+    fn toward(cos_o: f32, strength: f32, alpha: f32) -> (f32, Coat) {
+        let part = Albedo::of_ggx(cos_o, alpha);
+        let lost = (1.0 - part.a - part.b).max(0.0) / (part.a + part.b);
+        let coat = Coat { strength: strength * (1.0 + COAT_F0 * lost), alpha, probability: 0.0 };
+        (coat.albedo(part).min(1.0), coat)
+    }
+
+    fn albedo(&self, part: Albedo) -> f32 {
+        self.strength * (COAT_F0 * part.a + part.b)
+    }
 }
 
 impl Bsdf {
@@ -108,13 +146,15 @@ impl Bsdf {
             dielectric_f90: unit(sample.dielectric_f90),
             metallic,
             alpha: (roughness * roughness).max(ALPHA_MIN),
+            coat: if built_in::GLOSSY { unit(sample.coat) } else { 0.0 },
+            coat_alpha: unit(sample.coat_roughness).powi(2).max(ALPHA_MIN),
         }
     }
 
     /// Whether it has a specular lobe. Without one it is Lambertian.
     fn is_glossy(&self) -> bool {
-        let is_coated = self.dielectric_f90 > 0.0 || self.dielectric_f0 != Rgb::ZERO;
-        built_in::GLOSSY && (is_coated || self.metallic > 0.0)
+        let is_dielectric = self.dielectric_f90 > 0.0 || self.dielectric_f0 != Rgb::ZERO;
+        built_in::GLOSSY && (is_dielectric || self.metallic > 0.0 || self.coat > 0.0)
     }
 
     /// Towards `wo`.
@@ -128,6 +168,7 @@ impl Bsdf {
             diffuse: Rgb::ZERO,
             alpha: self.alpha,
             specular_probability: None,
+            coat: Coat::default(),
         };
         if wo.z <= 0.0 {
             return reflection;
@@ -142,16 +183,28 @@ impl Bsdf {
         let part = Albedo::of_ggx(wo.z, self.alpha);
         let lost = (1.0 - part.a - part.b).max(0.0) / (part.a + part.b);
         let (f0, f90) = (self.dielectric_f0, Rgb::splat(self.dielectric_f90));
-        let coat_gain = Rgb::ONE + f0 * lost;
-        let coat = ((f0 * part.a + f90 * part.b) * coat_gain).min(Rgb::ONE);
+        let gloss_gain = Rgb::ONE + f0 * lost;
+        let gloss = ((f0 * part.a + f90 * part.b) * gloss_gain).min(Rgb::ONE);
         let metal_gain = Rgb::ONE + self.metal_f0 * lost;
         let metal = (self.metal_f0 * part.a + part.b) * metal_gain;
-        reflection.diffuse = self.diffuse * (Rgb::ONE - coat);
-        reflection.at_normal = f0 * coat_gain * whole + self.metal_f0 * metal_gain * self.metallic;
-        reflection.toward_grazing = (f90 - f0) * coat_gain * whole
+        reflection.diffuse = self.diffuse * (Rgb::ONE - gloss);
+        reflection.at_normal = f0 * gloss_gain * whole + self.metal_f0 * metal_gain * self.metallic;
+        reflection.toward_grazing = (f90 - f0) * gloss_gain * whole
             + (Rgb::ONE - self.metal_f0) * metal_gain * self.metallic;
-        let specular = (coat * whole + metal * self.metallic).element_sum();
-        let all = specular + reflection.diffuse.element_sum() / FRAC_1_PI;
+        let mut specular = (gloss * whole + metal * self.metallic).element_sum();
+        let mut coat_part = 0.0;
+        if self.coat > 0.0 {
+            let (reflected, coat) = Coat::toward(wo.z, self.coat, self.coat_alpha);
+            let below = 1.0 - reflected;
+            reflection.coat = coat;
+            reflection.diffuse *= below;
+            reflection.at_normal *= below;
+            reflection.toward_grazing *= below;
+            specular *= below;
+            coat_part = 3.0 * reflected;
+        }
+        let all = coat_part + specular + reflection.diffuse.element_sum() / FRAC_1_PI;
+        reflection.coat.probability = if all > 0.0 { coat_part / all } else { 0.0 };
         reflection.specular_probability = (all > 0.0).then(|| specular / all);
         reflection
     }
@@ -169,8 +222,11 @@ impl Reflection {
     /// the path then ends without a contribution.
     #[inline]
     pub fn sample(&self, u_lobe: f32, u: Vec2) -> Option<BsdfSample> {
-        let wi = if built_in::GLOSSY && u_lobe < self.specular_probability? {
-            let h = ggx::sample_normal(self.wo, self.alpha, u);
+        let specular = self.specular_probability?;
+        let coat = self.coat.probability;
+        let wi = if built_in::GLOSSY && u_lobe < specular + coat {
+            let alpha = if u_lobe < specular { self.alpha } else { self.coat.alpha };
+            let h = ggx::sample_normal(self.wo, alpha, u);
             (2.0 * self.wo.dot(h) * h - self.wo).normalize()
         } else {
             warp::cosine_hemisphere(u)
@@ -183,27 +239,47 @@ impl Reflection {
         }
     }
 
-    /// Its lobes, as picking lights asks for them; `None` if nothing is reflected.
+    /// Its lobes, as picking lights asks for them; `None` if nothing is reflected. Of a coat and what is below,
+    /// the one that is brighter at its peak is the glossy lobe, and the other counts as diffuse: a bright peak is
+    /// what must not be missed.
     pub fn lobes(&self) -> Option<Lobes> {
-        self.specular_probability.map(|_| Lobes {
+        self.specular_probability?;
+        let base = Lobes {
             diffuse: luminance(self.diffuse) / FRAC_1_PI,
             at_normal: luminance(self.at_normal),
             toward_grazing: luminance(self.toward_grazing),
             alpha: self.alpha,
-        })
+        };
+        if self.coat.strength == 0.0 {
+            return Some(base);
+        }
+        let coat = Lobes {
+            diffuse: base.diffuse,
+            at_normal: self.coat.strength * COAT_F0,
+            toward_grazing: self.coat.strength * (1.0 - COAT_F0),
+            alpha: self.coat.alpha,
+        };
+        let peak = |lobes: &Lobes| lobes.at_normal / (lobes.alpha * lobes.alpha);
+        let (glossy, other) = if peak(&coat) > peak(&base) { (coat, base) } else { (base, coat) };
+        let part = Albedo::of_ggx(self.wo.z, other.alpha);
+        let beside = other.at_normal * (part.a + part.b) + other.toward_grazing * part.b;
+        Some(Lobes { diffuse: glossy.diffuse + beside, ..glossy })
     }
 
-    /// Reflectance of the specular and of the diffuse lobe; their sum is the share of a white
+    /// Reflectance of the specular lobes and of the diffuse one; their sum is the share of a white
     /// environment that the surface reflects.
     pub fn albedo(&self) -> (Rgb, Rgb) {
         if self.specular_probability.is_none() {
             return (Rgb::ZERO, Rgb::ZERO);
         }
-        if !built_in::GLOSSY || (self.at_normal, self.toward_grazing) == (Rgb::ZERO, Rgb::ZERO) {
-            return (Rgb::ZERO, self.diffuse / FRAC_1_PI);
+        let mut specular = Rgb::ZERO;
+        if built_in::GLOSSY && (self.at_normal, self.toward_grazing) != (Rgb::ZERO, Rgb::ZERO) {
+            let part = Albedo::of_ggx(self.wo.z, self.alpha);
+            specular = self.at_normal * (part.a + part.b) + self.toward_grazing * part.b;
         }
-        let part = Albedo::of_ggx(self.wo.z, self.alpha);
-        let specular = self.at_normal * (part.a + part.b) + self.toward_grazing * part.b;
+        if self.coat.strength > 0.0 {
+            specular += self.coat.albedo(Albedo::of_ggx(self.wo.z, self.coat.alpha));
+        }
         (specular, self.diffuse / FRAC_1_PI)
     }
 
@@ -214,14 +290,20 @@ impl Reflection {
             return (Rgb::ZERO, 0.0);
         };
         let mut value = self.diffuse * cos_i;
-        let mut pdf = (1.0 - specular_probability) * warp::cosine_hemisphere_pdf(cos_i);
-        if built_in::GLOSSY && specular_probability > 0.0 {
+        let glossy_probability = specular_probability + self.coat.probability;
+        let mut pdf = (1.0 - glossy_probability) * warp::cosine_hemisphere_pdf(cos_i);
+        if built_in::GLOSSY && glossy_probability > 0.0 {
             let h = (self.wo + wi).normalize_or(Vec3::Z);
             let schlick = (1.0 - self.wo.dot(h)).clamp(0.0, 1.0).powi(5);
             let shape =
-                ggx::distribution(h, self.alpha) * ggx::visibility_cos(cos_o, cos_i, self.alpha);
-            value += (self.at_normal + self.toward_grazing * schlick) * shape;
+                |alpha| ggx::distribution(h, alpha) * ggx::visibility_cos(cos_o, cos_i, alpha);
+            value += (self.at_normal + self.toward_grazing * schlick) * shape(self.alpha);
             pdf += specular_probability * ggx::reflection_pdf(cos_o, h, self.alpha);
+            let Coat { strength, alpha, probability } = self.coat;
+            if strength > 0.0 {
+                value += strength * (COAT_F0 + (1.0 - COAT_F0) * schlick) * shape(alpha);
+                pdf += probability * ggx::reflection_pdf(cos_o, h, alpha);
+            }
         }
         (value, pdf)
     }

@@ -20,6 +20,8 @@ fn dielectric(base: f32, roughness: f32) -> SurfaceSample {
         roughness,
         dielectric_f0: Rgb::splat(0.04),
         dielectric_f90: 1.0,
+        coat: 0.0,
+        coat_roughness: 0.0,
     }
 }
 
@@ -29,6 +31,10 @@ fn metal(base: f32, roughness: f32) -> SurfaceSample {
 
 fn lambert(base: f32) -> SurfaceSample {
     SurfaceSample { dielectric_f0: Rgb::ZERO, dielectric_f90: 0.0, ..dielectric(base, 0.3) }
+}
+
+fn coated(below: SurfaceSample, coat: f32, coat_roughness: f32) -> SurfaceSample {
+    SurfaceSample { coat, coat_roughness, ..below }
 }
 
 fn tilted(cosine: f32) -> Vec3 {
@@ -55,7 +61,10 @@ const COSINES: [f32; 6] = [1.0, 0.9, 0.6, 0.3, 0.1, 0.02];
 fn white_surfaces_return_all_light() {
     for roughness in [0.05, 0.1, 0.2, 0.35, 0.5, 0.75, 1.0] {
         let half = SurfaceSample { metallic: 0.5, ..dielectric(1.0, roughness) };
-        for sample in [metal(1.0, roughness), dielectric(1.0, roughness), half, lambert(1.0)] {
+        let bare = [metal(1.0, roughness), dielectric(1.0, roughness), half, lambert(1.0)];
+        let smooth = bare.map(|below| coated(below, 1.0, 0.1));
+        let rough = bare.map(|below| coated(below, 0.6, 0.7));
+        for sample in bare.into_iter().chain(smooth).chain(rough) {
             for cosine in COSINES {
                 let reflected = furnace(&upright(&sample), tilted(cosine));
                 let error = (reflected - 1.0).abs();
@@ -69,7 +78,9 @@ fn white_surfaces_return_all_light() {
 fn no_surface_creates_light_and_the_albedo_is_what_it_reflects() {
     for roughness in [0.0, 0.2, 0.6, 1.0] {
         for base in [0.0, 0.18, 0.8] {
-            for sample in [metal(base, roughness), dielectric(base, roughness), lambert(base)] {
+            let bare = [metal(base, roughness), dielectric(base, roughness), lambert(base)];
+            let coats = bare.map(|below| coated(below, 0.8, 0.6 - 0.5 * roughness));
+            for sample in bare.into_iter().chain(coats) {
                 for cosine in COSINES {
                     let bsdf = upright(&sample);
                     let reflected = furnace(&bsdf, tilted(cosine));
@@ -99,7 +110,9 @@ fn without_specular_it_is_exactly_lambertian() {
 fn samples_carry_their_own_value_and_density() {
     let frame = Frame::around(Vec3::new(0.3, -0.7, 0.2).normalize());
     for roughness in [0.0, 0.1, 0.4, 1.0] {
-        for sample in [metal(0.7, roughness), dielectric(0.3, roughness), lambert(0.6)] {
+        let bare = [metal(0.7, roughness), dielectric(0.3, roughness), lambert(0.6)];
+        let coats = bare.map(|below| coated(below, 1.0, roughness));
+        for sample in bare.into_iter().chain(coats) {
             let bsdf = Bsdf::new(&sample, frame);
             for cosine in COSINES {
                 let wo = frame.to_outer(tilted(cosine)).normalize();
@@ -138,7 +151,9 @@ fn directions_fall_where_the_density_says() {
     const ROWS: usize = 10;
     const COLUMNS: usize = 16;
     let n = 40_000;
-    for sample in [metal(0.9, 0.6), dielectric(0.5, 0.5), metal(0.9, 1.0), lambert(0.4)] {
+    let bare = [metal(0.9, 0.6), dielectric(0.5, 0.5), metal(0.9, 1.0), lambert(0.4)];
+    let coats = [coated(metal(0.3, 0.9), 1.0, 0.5), coated(lambert(0.1), 0.7, 0.6)];
+    for sample in bare.into_iter().chain(coats) {
         for cosine in [0.95_f32, 0.5, 0.1] {
             let (bsdf, wo) = (upright(&sample), tilted(cosine));
             let mut counts = [0_u32; ROWS * COLUMNS];
@@ -189,8 +204,11 @@ fn the_horizon_and_the_mirror_stay_finite() {
         roughness: -3.0,
         dielectric_f0: Rgb::splat(7.0),
         dielectric_f90: f32::INFINITY,
+        coat: f32::INFINITY,
+        coat_roughness: -1.0,
     };
-    for sample in [wild, metal(1.0, 0.0), dielectric(1.0, 0.0), dielectric(0.0, 1.0)] {
+    let mirrors = coated(metal(1.0, 0.0), 1.0, 0.0);
+    for sample in [wild, mirrors, metal(1.0, 0.0), dielectric(1.0, 0.0), dielectric(0.0, 1.0)] {
         let bsdf = upright(&sample);
         for cosine in [1.0_f32, 1e-3, 1e-6, 1e-20, 1e-38, 0.0, -0.5] {
             let wo = Vec3::new((1.0 - cosine * cosine).sqrt(), 0.0, cosine);
@@ -231,6 +249,49 @@ fn single_scattering_is_reciprocal() {
     let forth = bsdf.toward(a).eval(b).0 / b.z;
     let back = bsdf.toward(b).eval(a).0 / a.z;
     assert!((forth - back).abs().max_element() < 1e-7);
+}
+
+/// A coat of no strength is none, to the last bit; a smooth one is `KHR_materials_clearcoat`'s: what is below is
+/// darkened by Fresnel's term at `wo`, and away from the mirror direction nothing is added.
+#[test]
+fn a_smooth_coat_darkens_what_is_below_by_its_fresnel_term() {
+    let wi = Vec3::new(0.0, 0.6, 0.8);
+    for below in [metal(0.7, 0.4), dielectric(0.5, 0.8), lambert(0.6)] {
+        for cosine in [1.0_f32, 0.7, 0.4] {
+            let wo = tilted(cosine);
+            let (bare, pdf) = upright(&below).toward(wo).eval(wi);
+            let none = upright(&coated(below, 0.0, 0.3)).toward(wo);
+            assert_eq!(none.eval(wi), (bare, pdf));
+            assert_eq!(none.lobes(), upright(&below).toward(wo).lobes());
+            for strength in [0.5, 1.0] {
+                let coat = upright(&coated(below, strength, 0.0)).toward(wo);
+                let fresnel = COAT_F0 + (1.0 - COAT_F0) * (1.0 - cosine).powi(5);
+                let ratio = coat.eval(wi).0 / bare;
+                let expected = 1.0 - strength * fresnel;
+                assert!((ratio - expected).abs().max_element() < 2e-3, "{ratio} {expected}");
+            }
+        }
+    }
+}
+
+/// A coat on black is the lobe of a black dielectric.
+#[test]
+fn a_coat_on_black_is_a_dielectric() {
+    for roughness in [0.05, 0.3, 1.0] {
+        let coat = upright(&coated(lambert(0.0), 1.0, roughness));
+        let dielectric = upright(&dielectric(0.0, roughness));
+        for cosine in COSINES {
+            let wo = tilted(cosine);
+            let [a, b] = [&coat, &dielectric].map(|bsdf| bsdf.toward(wo));
+            for wi in [wo, tilted(0.5), Vec3::new(-wo.x, 0.0, wo.z), Vec3::new(0.6, 0.48, 0.64)] {
+                let ((value, pdf), (expected, density)) = (a.eval(wi), b.eval(wi));
+                assert!((value - expected).abs().max_element() <= 1e-5 * expected.x);
+                assert!((pdf - density).abs() <= 1e-5 * density);
+            }
+            let (found, expected) = (a.albedo().0, b.albedo().0);
+            assert!((found - expected).abs().max_element() < 1e-6, "{found} {expected}");
+        }
+    }
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! What a hit looks like, on a unit square with known attributes.
 
 use super::*;
-use crate::scene::{Instance, Node, Pixels, Texture, Trs, Wrap};
+use crate::scene::{Coat, Instance, Node, Pixels, Texture, Trs, Wrap};
 use glam::{DQuat, DVec3};
 
 /// A unit square in the XY plane, front toward +Z, the picture upright on it.
@@ -64,6 +64,12 @@ fn factors_multiply_textures_and_vertex_colours() {
         metallic_roughness_texture: USED,
         specular: 0.6,
         specular_color: Rgb::new(2.0, 1.0, 100.0),
+        coat: Some(Coat {
+            factor: 0.5,
+            factor_texture: USED,
+            roughness: 0.8,
+            roughness_texture: USED,
+        }),
         opacity: 0.8,
         alpha_mode: AlphaMode::Blend,
         ..Default::default()
@@ -80,6 +86,8 @@ fn factors_multiply_textures_and_vertex_colours() {
     );
     close(surface.sample.dielectric_f0, Rgb::new(0.08, 0.04, 1.0) * 0.6);
     assert_eq!(surface.sample.dielectric_f90, 0.6);
+    let SurfaceSample { coat, coat_roughness, .. } = surface.sample;
+    close(Vec3::new(coat, coat_roughness, 0.0), Vec3::new(0.5, 0.16, 0.0));
     let pose = scene.pose_at(0.0);
     let coverage = |scene: &Scene| Surfaces::new(scene, &pose).coverage(0, 0, Vec2::new(0.9, 0.05));
     assert!((coverage(&scene) - 0.8 * 0.5 * 0.2).abs() < 1e-6);
