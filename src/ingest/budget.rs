@@ -28,6 +28,12 @@ impl Budget {
         self.left_bytes = self.left_bytes.saturating_add(more);
     }
 
+    /// Says that memory which was asked for is free again. Who does this has spent no more time on it than on what
+    /// is kept.
+    pub(super) fn put_back(&mut self, bytes: u64) {
+        self.left_bytes = self.left_bytes.saturating_add(bytes);
+    }
+
     /// Asks for memory before it is allocated. The object names who asks.
     pub(super) fn take(
         &mut self,

@@ -74,6 +74,15 @@ fn what_cannot_pose_a_mesh_leaves_it_as_it_is() {
         skinless("joints that are not in the scene", &|f| {
             f.json["scenes"][0]["nodes"] = json!([0])
         }),
+        skinless("17 sets of joints", &|f| {
+            let attributes = f.json["meshes"][0]["primitives"][0]["attributes"].clone();
+            for set in 1..17 {
+                for name in ["JOINTS", "WEIGHTS"] {
+                    let accessor = attributes[format!("{name}_0")].as_u64().unwrap();
+                    attribute(f, &format!("{name}_{set}"), accessor as usize);
+                }
+            }
+        }),
         skinless("no WEIGHTS_0", &|f| {
             let primitive = &mut f.json["meshes"][0]["primitives"][0];
             primitive["attributes"].as_object_mut().unwrap().remove("WEIGHTS_0");
@@ -182,6 +191,32 @@ fn what_poses_a_mesh_may_be_odd() {
     let scene = load(&file);
     assert!(scene.meshes[0].normals.iter().all(|normal| normal.is_normalized()));
     assert_near(&places(&scene, 0, 0.0), &[Vec3::Z * 2.0; 3]);
+}
+
+/// Copies of a mesh take what they hold, and not what it took to make them.
+#[test]
+fn a_crowd_may_share_a_mesh() {
+    const VERTICES: usize = 5000;
+    const MEMBERS: usize = 400;
+    let mut file = lamp();
+    let row = |i: usize| [i as f32, (i * i % 97) as f32, 0.0];
+    let positions = file.floats(&(0..VERTICES).flat_map(row).collect::<Vec<_>>(), "VEC3");
+    file.attribute("POSITION", positions);
+    let corner = |i: usize| (i / 3 + i % 3).min(VERTICES - 1) as u32;
+    let corners: Vec<u8> =
+        (0..6 * VERTICES).flat_map(|i| corner(i % (3 * VERTICES)).to_le_bytes()).collect();
+    let indices = file.array(&corners, 5125, 6 * VERTICES, "SCALAR");
+    file.json["meshes"][0]["primitives"][0]["indices"] = json!(indices);
+    file.add("nodes", json!({"name": "joint"}));
+    bind(&mut file, &[1], None, &[vec![all((0, 1.0)); VERTICES]]);
+    for member in 1..MEMBERS {
+        let joint = file.add("nodes", json!({"translation": [0, 0, member]}));
+        let skin = file.add("skins", json!({"joints": [joint]}));
+        file.add("nodes", json!({"mesh": 0, "skin": skin}));
+    }
+    file.json["scenes"][0]["nodes"] = (0..2 * MEMBERS).collect();
+    let scene = load(&file);
+    assert_eq!((scene.meshes.len(), scene.notes.len()), (MEMBERS, 0));
 }
 
 #[test]

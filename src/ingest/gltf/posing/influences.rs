@@ -1,12 +1,13 @@
 //! Which joints move a vertex, and how much: `JOINTS_n` and `WEIGHTS_n`.
 
 use super::Arrays;
-use crate::ingest::error::Fault;
-use crate::ingest::gltf::Output;
 use crate::ingest::gltf::accessors::Accessor;
 use glam::Vec4;
-use gltf::json::mesh::Semantic;
+use gltf::json::mesh::{Primitive, Semantic};
 use gltf::json::validation::Checked;
+
+/// More sets than this are not read: sixty-four joints a vertex.
+const MOST_SETS: usize = 16;
 
 /// The influences on the vertices of a primitive. Each set has four for each vertex.
 pub(super) struct Influences {
@@ -19,32 +20,25 @@ struct Set {
 }
 
 impl Influences {
+    /// How many bytes the influences on a vertex of a primitive take; else it has more than are read.
+    pub(super) fn bytes(primitive: &Primitive) -> Result<usize, String> {
+        match sets(primitive).count() {
+            count if count > MOST_SETS => Err(format!("has {count} sets of joints")),
+            count => Ok(count * size_of::<([f32; 4], Vec4)>()),
+        }
+    }
+
     /// Reads all sets; else says what is wrong with one.
-    pub(super) fn read(
-        output: &mut Output,
-        arrays: &Arrays,
-        vertices: usize,
-        object: &str,
-    ) -> Result<Result<Influences, String>, Fault> {
-        let mut sets = Vec::new();
-        for (joints, weights) in (0..).map(|set| (Semantic::Joints(set), Semantic::Weights(set))) {
-            let attributes = &arrays.attributes.primitive.attributes;
-            if !attributes.contains_key(&Checked::Valid(joints.clone())) {
-                break;
-            }
-            let accessors = both(arrays, joints, weights);
-            let (joints, weights) = match accessors {
-                Ok(accessors) => accessors,
-                Err(problem) => return Ok(Err(problem)),
-            };
-            let bytes = vertices * size_of::<([f32; 4], Vec4)>();
-            output.budget.take(bytes as u64, || object.to_string())?;
-            sets.push(Set {
+    pub(super) fn read(arrays: &Arrays) -> Result<Influences, String> {
+        let set = |(joints, weights)| {
+            let (joints, weights) = both(arrays, joints, weights)?;
+            Ok(Set {
                 joints: arrays.vertices.read(joints, 0.0, |joints| joints),
                 weights: arrays.vertices.read(weights, 0.0, Vec4::from_array),
-            });
-        }
-        Ok(Ok(Influences { sets }))
+            })
+        };
+        let sets = sets(arrays.attributes.primitive).map(set).collect::<Result<_, String>>()?;
+        Ok(Influences { sets })
     }
 
     /// The joints that move a vertex, by their place in the skin, with weights that sum to one but for
@@ -67,6 +61,12 @@ impl Influences {
     pub(super) fn is_free(&self, vertex: usize) -> bool {
         self.sets.iter().all(|set| !(set.weights[vertex].cmpgt(Vec4::ZERO).any()))
     }
+}
+
+/// The sets that a primitive has, numbered without a gap.
+fn sets(primitive: &Primitive) -> impl Iterator<Item = (Semantic, Semantic)> {
+    let all = (0..).map(|set| (Semantic::Joints(set), Semantic::Weights(set)));
+    all.take_while(|(joints, _)| primitive.attributes.contains_key(&Checked::Valid(joints.clone())))
 }
 
 fn both<'a>(

@@ -8,11 +8,22 @@ use crate::ingest::gltf::accessors::Accessor;
 use crate::ingest::gltf::{Output, Source};
 use crate::scene::{Category, Mesh};
 use glam::{DAffine3, DMat3, DMat4, Vec3};
+use gltf::json::Skin;
 use gltf::json::accessor::{ComponentType, Type};
 use std::collections::HashSet;
 
-/// What a joint that moves a primitive takes at most, in memory and in time: it may be hundreds of nodes deep.
-const JOINT_BYTES: u64 = 512;
+/// What a joint takes at most: a matrix, places in lists and a set, and time, for it may be hundreds of nodes deep.
+const JOINT_BYTES: usize = 640;
+
+/// What a vertex takes beside its influences, while the mesh is moved.
+const VERTEX_BYTES: usize = size_of::<(bool, Vec3, Option<DAffine3>)>();
+
+/// How a mesh was moved.
+struct Moved {
+    hung: Hung,
+    /// Whether there are vertices without weights.
+    has_free: bool,
+}
 
 /// Moves a mesh by the joints of a skin; else says what is wrong with that, and leaves the mesh as it was.
 pub(super) fn apply(
@@ -26,42 +37,53 @@ pub(super) fn apply(
     let Some(row) = source.document.skins.get(skin) else {
         return Ok(Err("its skin is not in the file".into()));
     };
-    let inverse_bind = match row.inverse_bind_matrices.map(|index| source.accessors.get(index)) {
-        Some(Err(problem)) => return Ok(Err(format!("its skin cannot be read: {problem}"))),
-        Some(Ok(accessor)) if !is_matrices(accessor, row.joints.len()) => {
-            return Ok(Err("its skin has no inverse bind matrix for each joint".into()));
-        }
-        Some(Ok(accessor)) => Some(accessor),
-        None => None,
-    };
-    let influences = match Influences::read(output, arrays, mesh.positions.len(), object)? {
-        Ok(influences) => influences,
+    let of_influences = match Influences::bytes(arrays.attributes.primitive) {
+        Ok(bytes) => bytes,
         Err(problem) => return Ok(Err(problem)),
     };
-    // A matrix and a place in a set that is half empty.
-    let bytes = row.joints.len() * size_of::<(DAffine3, bool, [usize; 4])>()
-        + mesh.positions.len() * size_of::<(bool, Vec3, Option<DAffine3>)>();
-    output.budget.take(bytes as u64, || object.to_string())?;
+    let bytes = (JOINT_BYTES * row.joints.len()) as u64;
+    output.budget.take(bytes, || object.to_string())?;
+    let bytes = ((VERTEX_BYTES + of_influences) * mesh.positions.len()) as u64;
+    output.budget.take(bytes, || object.to_string())?;
+    let moved = moved(source, (rig, row), arrays, mesh);
+    output.budget.put_back(bytes);
+    Ok(moved.map(|Moved { hung, has_free }| {
+        if has_free {
+            let text = "has vertices without weights of joints; they follow their first joint";
+            output.notes.add(Category::Animation, object, text);
+        }
+        hung
+    }))
+}
 
+fn moved(
+    source: &Source,
+    (rig, row): (&Rig, &Skin),
+    arrays: &Arrays,
+    mesh: &mut Mesh,
+) -> Result<Moved, String> {
+    let nodes: Vec<usize> = row.joints.iter().map(|joint| joint.value()).collect();
+    let inverse_bind = row.inverse_bind_matrices.map(|index| source.accessors.get(index));
+    let inverse_bind = inverse_bind
+        .transpose()
+        .map_err(|problem| format!("its skin cannot be read: {problem}"))?;
+    if inverse_bind.is_some_and(|accessor| !is_matrices(accessor, nodes.len())) {
+        return Err("its skin has no inverse bind matrix for each joint".into());
+    }
+    let influences = Influences::read(arrays)?;
     let used = used(mesh);
-    let of_mesh = (0..mesh.positions.len()).filter(|&vertex| used[vertex]);
-    let mut moves = vec![false; row.joints.len()];
-    let mut free = false;
-    for vertex in of_mesh {
-        free |= influences.is_free(vertex);
+    let mut moves = vec![false; nodes.len()];
+    let mut has_free = false;
+    for vertex in (0..used.len()).filter(|&vertex| used[vertex]) {
+        has_free |= influences.is_free(vertex);
         for (joint, _) in influences.of(vertex) {
-            match moves.get_mut(joint) {
-                Some(moves) => *moves = true,
-                None => return Ok(Err("has a joint that its skin does not have".into())),
-            }
+            *moves.get_mut(joint).ok_or("has a joint that its skin does not have")? = true;
         }
     }
-    let nodes: Vec<usize> = row.joints.iter().map(|joint| joint.value()).collect();
     let moving: Vec<usize> = (0..nodes.len()).filter(|&joint| moves[joint]).collect();
     if moving.iter().any(|&joint| !rig.has(nodes[joint])) {
-        return Ok(Err("its skin has joints that are not in the scene".into()));
+        return Err("its skin has joints that are not in the scene".into());
     }
-    output.budget.take(JOINT_BYTES * moving.len() as u64, || object.to_string())?;
     let hung = hang(rig, &nodes, &moving);
     let mut matrices = vec![DAffine3::ZERO; nodes.len()];
     for joint in moving {
@@ -76,34 +98,36 @@ pub(super) fn apply(
         .enumerate()
         .map(|(vertex, used)| used.then(|| blend(&matrices, influences.of(vertex))))
         .collect();
+    bend(mesh, &of_vertices)?;
+    Ok(Moved { hung, has_free })
+}
+
+/// Moves each vertex that has a matrix; else says that it goes too far, and moves none.
+fn bend(mesh: &mut Mesh, matrices: &[Option<DAffine3>]) -> Result<(), String> {
     let mut places = mesh.positions.clone();
-    for (place, matrix) in places.iter_mut().zip(&of_vertices) {
+    for (place, matrix) in places.iter_mut().zip(matrices) {
         let Some(matrix) = matrix else { continue };
         let moved = matrix.transform_point3(place.as_dvec3());
         if !is_near(moved) {
-            return Ok(Err("its skin leads out of all bounds".into()));
+            return Err("its skin leads out of all bounds".into());
         }
         *place = moved.as_vec3();
     }
     mesh.positions = places;
-    for (vertex, matrix) in of_vertices.iter().enumerate() {
+    for (vertex, matrix) in matrices.iter().enumerate() {
         if let Some(matrix) = matrix {
             turn(mesh, vertex, matrix.matrix3);
         }
     }
     let mirrors = |vertex: u32| {
-        of_vertices[vertex as usize].is_some_and(|matrix| matrix.matrix3.determinant() < 0.0)
+        matrices[vertex as usize].is_some_and(|matrix| matrix.matrix3.determinant() < 0.0)
     };
     for triangle in &mut mesh.triangles {
         if triangle.iter().filter(|&&vertex| mirrors(vertex)).count() > 1 {
             triangle.swap(1, 2);
         }
     }
-    if free {
-        let text = "has vertices without weights of joints; they follow their first joint";
-        output.notes.add(Category::Animation, object, text);
-    }
-    Ok(Ok(hung))
+    Ok(())
 }
 
 fn is_matrices(accessor: &Accessor, joints: usize) -> bool {
