@@ -42,20 +42,6 @@ impl LightBounds {
         }
     }
 
-    /// The bounds of one emitter over some times: they contain it at each, and have its mean energy.
-    ///
-    /// # Panics
-    /// If there are none.
-    pub fn over_time(times: impl Iterator<Item = LightBounds>) -> LightBounds {
-        let times: Vec<LightBounds> = times.collect();
-        if times.iter().all(|bounds| *bounds == times[0]) {
-            return times[0];
-        }
-        let energy = times.iter().map(|bounds| f64::from(bounds.energy)).sum::<f64>();
-        let energy = (energy / times.len() as f64) as f32;
-        LightBounds { energy, ..LightBounds::around(&times) }
-    }
-
     /// Whether every number is finite and the energy positive: what the tree may be built over.
     pub fn is_sound(&self) -> bool {
         let numbers = [self.aabb.min, self.aabb.max, self.cone.axis];

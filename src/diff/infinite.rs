@@ -41,11 +41,13 @@ pub(super) fn find(scene: &Scene, pose: &Pose, frames: &[i32]) -> Vec<Infinite> 
         hasher.update(&profile.half_angle_rad.unwrap_or(0.0).to_le_bytes());
         hasher.update(bytemuck::bytes_of(&rgb));
         hasher.update(bytemuck::bytes_of(&pose.world(light.node).matrix3.to_cols_array()));
-        if let Some(Keys { times_s, values, interpolation }) =
-            light.values.as_ref().filter(|keys| keys.varies())
-        {
-            hasher.update(bytemuck::cast_slice(times_s)).update(bytemuck::cast_slice(values));
-            hasher.update(&[*interpolation as u8]);
+        if let Some(keys) = light.values.as_ref().filter(|keys| keys.varies()) {
+            // Frame by frame: which second a frame is says nothing of the light.
+            for &frame in frames {
+                let time_s = scene.timeline.seconds_at(frame.into());
+                let rgb = keys.at(time_s, scene.timeline).as_vec3();
+                hasher.update(bytemuck::bytes_of(&rgb));
+            }
         }
         hasher.update(way.map_or(&[], |way| way.as_slice()));
         let bit = |is: bool, bit: u32| if is { bit } else { 0 };

@@ -74,7 +74,7 @@ impl<D: AsRef<[u8]>> Subject<'_, '_, D> {
         self.delegate.set_settings(self.small());
         // Posing the scene takes as long for a small picture as for a large one.
         let started = Instant::now();
-        self.delegate.at_frame(self.tree, self.frame, |_| ())?;
+        self.delegate.prepare(self.tree, self.frame)?;
         let before = started.elapsed().as_secs_f64();
         let mut film = self.delegate.film()?;
         let mut control = ToError::new(ErrorGoal { most: goal.most.min(MOST), ..goal });

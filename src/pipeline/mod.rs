@@ -38,6 +38,7 @@ mod stamp;
 mod strict;
 mod survey;
 mod surveyor;
+mod swept;
 mod textures;
 mod view;
 mod view_keys;

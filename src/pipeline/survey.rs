@@ -52,6 +52,14 @@ pub struct SharedBounds {
     pub(super) fingerprint: [u8; 32],
 }
 
+impl SharedBounds {
+    /// Of these bounds.
+    pub(super) fn new(bounds: Vec<LightBounds>) -> SharedBounds {
+        let (energy, fingerprint) = (sum(&bounds), fingerprint::of_bounds(&bounds));
+        SharedBounds { bounds, energy, fingerprint }
+    }
+}
+
 /// Lights that are sampled together.
 #[derive(Default)]
 pub struct Group {

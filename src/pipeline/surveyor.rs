@@ -2,17 +2,14 @@
 
 use super::fingerprint;
 use super::survey::{Group, PlacedLight, SharedBounds, SurveyedFrame};
+use super::swept::Swept;
 use crate::bounds::LightBounds;
 use crate::emitter::{Emitters, LightEntry, LightOverflow, LightSource, PosedEmitters};
 use crate::math::Similarity;
 use crate::scene::{Pose, Posing, Scene};
 use std::iter::once;
 use std::ops::Range;
-use std::slice;
 use std::sync::Arc;
-
-/// Emitters whose bounds are found together, at all times of a frame.
-const TOGETHER: usize = 1 << 12;
 
 /// A shot, of which what stands still has been surveyed.
 pub(super) struct Surveyor<'a> {
@@ -56,7 +53,7 @@ impl<'a> Surveyor<'a> {
         };
         let pose = scene.pose_at(0.0);
         surveyor.share_meshes(&pose)?;
-        surveyor.still = surveyor.group(slice::from_ref(&pose), &standing)?;
+        surveyor.still = surveyor.group(&pose, &standing)?;
         surveyor.lasting = surveyor.shared.len();
         surveyor.still_energy = surveyor.energy_of(&surveyor.still);
         surveyor.check_total(&surveyor.still, 0.0)?;
@@ -77,14 +74,7 @@ impl<'a> Surveyor<'a> {
     pub fn frame(&mut self, number: i32) -> Result<SurveyedFrame, LightOverflow> {
         let mut posing = self.posing.take().unwrap_or_else(|| Posing::new(self.scene));
         let changing = std::mem::take(&mut self.changing);
-        let group = match *self.scene.times_of_all(number) {
-            [time] => self.group(slice::from_ref(posing.at_frame(time)), &changing),
-            ref times => {
-                let at = |&time: &f64| posing.at_frame(time).clone();
-                let poses: Vec<Pose> = times.iter().map(at).collect();
-                self.group(&poses, &changing)
-            }
-        };
+        let group = self.group_over(&self.scene.times_of_all(number), &mut posing, &changing);
         (self.posing, self.changing) = (Some(posing), changing);
         let group = group?;
         self.check_total(&group, self.still_energy)?;
@@ -124,16 +114,56 @@ impl<'a> Surveyor<'a> {
         Ok(())
     }
 
-    /// Some lights over some poses, by rows in ascending order: those that stand still, or those that change.
-    fn group(&mut self, poses: &[Pose], rows: &[u32]) -> Result<Group, LightOverflow> {
-        let emitters = self.emitters;
+    /// Some lights over some times, by rows in ascending order.
+    fn group_over(
+        &mut self,
+        times: &[f64],
+        posing: &mut Posing,
+        rows: &[u32],
+    ) -> Result<Group, LightOverflow> {
+        let own = self.shared.len();
+        let mut group = self.group(posing.at_frame(times[0]), rows)?;
+        if times.len() == 1 {
+            return Ok(group);
+        }
+        let of_shared = |shared: &mut SharedBounds| Swept::new(std::mem::take(&mut shared.bounds));
+        let mut flat = Swept::new(std::mem::take(&mut group.flat));
+        let mut forced: Vec<Swept> = self.shared[own..].iter_mut().map(of_shared).collect();
+        let brightness = |group: &Group| {
+            let all = group.placed.iter().chain(&group.forced);
+            all.map(|placed| f64::from(placed.brightness)).collect::<Vec<f64>>()
+        };
+        let mut bright = brightness(&group);
+        for &time in &times[1..] {
+            let kept = self.shared.len();
+            let at = self.group(posing.at_frame(time), rows)?;
+            flat.add(&at.flat);
+            forced.iter_mut().zip(&self.shared[kept..]).for_each(|(own, at)| own.add(&at.bounds));
+            bright.iter_mut().zip(brightness(&at)).for_each(|(sum, own)| *sum += own);
+            self.shared.truncate(kept);
+        }
+        group.flat = flat.over(times.len());
+        for (row, swept) in (own..).zip(forced) {
+            self.shared[row] = SharedBounds::new(swept.over(times.len()));
+        }
+        let all = group.placed.iter_mut().chain(&mut group.forced);
+        all.zip(bright).for_each(|(placed, sum)| {
+            placed.brightness = (sum / times.len() as f64) as f32;
+        });
+        Ok(group)
+    }
+
+    /// Some lights in a pose, by rows in ascending order: those that stand still, or those that change.
+    fn group(&mut self, pose: &Pose, rows: &[u32]) -> Result<Group, LightOverflow> {
+        let Surveyor { scene, emitters, .. } = *self;
+        let posed = PosedEmitters { scene, emitters, pose };
         let mut flat: Option<Range<u32>> = None;
         let mut group = Group::default();
         for &row in rows {
             let light = &emitters.lights()[row as usize];
             let of_light = light.first..light.first + light.count;
             if light.in_own_space || light.forced {
-                let placed = self.place(poses, row, light)?;
+                let placed = self.place(&posed, row, light)?;
                 if light.forced { &mut group.forced } else { &mut group.placed }.push(placed);
             } else {
                 flat = Some(flat.map_or(of_light.clone(), |flat| flat.start..of_light.end));
@@ -141,35 +171,16 @@ impl<'a> Surveyor<'a> {
         }
         let flat = flat.unwrap_or(0..0);
         group.first = flat.start;
-        group.flat = self.bounds(poses, flat)?;
+        group.flat = posed.bounds(flat)?;
         Ok(group)
-    }
-
-    /// The bounds of some emitters over some poses, world space.
-    fn bounds(&self, poses: &[Pose], range: Range<u32>) -> Result<Vec<LightBounds>, LightOverflow> {
-        let Surveyor { scene, emitters, .. } = *self;
-        let at = |pose, range| PosedEmitters { scene, emitters, pose }.bounds(range);
-        if let [pose] = poses {
-            return at(pose, range);
-        }
-        let mut swept = Vec::with_capacity(range.len());
-        for first in range.clone().step_by(TOGETHER) {
-            let part = first..range.end.min(first + TOGETHER as u32);
-            let at_times = poses.iter().map(|pose| at(pose, part.clone()));
-            let at_times = at_times.collect::<Result<Vec<_>, _>>()?;
-            let of_emitter = |i: usize| LightBounds::over_time(at_times.iter().map(|all| all[i]));
-            swept.extend((0..part.len()).map(of_emitter));
-        }
-        Ok(swept)
     }
 
     fn place(
         &mut self,
-        poses: &[Pose],
+        posed: &PosedEmitters,
         row: u32,
         light: &LightEntry,
     ) -> Result<PlacedLight, LightOverflow> {
-        let Surveyor { scene, emitters, .. } = *self;
         let placed = |shared, to_local, brightness| PlacedLight {
             shared,
             to_local,
@@ -180,23 +191,17 @@ impl<'a> Surveyor<'a> {
         if let LightSource::Mesh { mesh_light, .. } = light.source
             && let Some(shared) = self.own[mesh_light as usize].filter(|_| light.in_own_space)
         {
-            // It stands still while a shutter is open, but its strength may change.
-            let at = |pose| PosedEmitters { scene, emitters, pose }.placing(row);
-            let placings: Option<Vec<_>> = poses.iter().map(at).collect();
-            let placings = placings.ok_or_else(|| LightOverflow { path: light.path.clone() })?;
-            let sum: f64 = placings.iter().map(|(_, brightness)| f64::from(*brightness)).sum();
-            let brightness = (sum / placings.len() as f64) as f32;
-            return Ok(placed(shared, placings[0].0, brightness));
+            let (to_local, brightness) =
+                posed.placing(row).ok_or_else(|| LightOverflow { path: light.path.clone() })?;
+            return Ok(placed(shared, to_local, brightness));
         }
         // A forced light of any other kind has a tree of its own in world space.
-        let bounds = self.bounds(poses, light.first..light.first + light.count)?;
-        let shared = self.share(bounds);
+        let shared = self.share(posed.bounds(light.first..light.first + light.count)?);
         Ok(placed(shared, Similarity::IDENTITY, 1.0))
     }
 
     fn share(&mut self, bounds: Vec<LightBounds>) -> u32 {
-        let (energy, fingerprint) = (sum(&bounds), fingerprint::of_bounds(&bounds));
-        self.shared.push(SharedBounds { bounds, energy, fingerprint });
+        self.shared.push(SharedBounds::new(bounds));
         self.shared.len() as u32 - 1
     }
 

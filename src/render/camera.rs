@@ -14,7 +14,7 @@ use crate::scene::{Camera, Pose, Projection};
 use glam::{DVec2, DVec3, Vec2, Vec3};
 
 /// A camera at one time and one resolution.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CameraRays {
     /// World space, metres.
     position: Vec3,
@@ -31,7 +31,7 @@ pub struct CameraRays {
     clip_m: [f32; 2],
 }
 
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 enum Optics {
     Pinhole,
     /// Radius of the lens and distance of the plane in focus, metres.
@@ -54,7 +54,7 @@ impl CameraRays {
     /// Places the camera at its node. The node's scale is ignored, as glTF asks, and a mirrored node does
     /// not mirror the picture. The camera looks where the transform takes -Z. The top of the picture is
     /// where it takes +Y, projected at right angles to the view.
-    pub fn new(camera: &Camera, pose: &Pose, width: u32, height: u32) -> CameraRays {
+    pub fn new(camera: &Camera, pose: &Pose, [width, height]: [u32; 2]) -> CameraRays {
         let world = pose.world(camera.node);
         let [right, up, back] = view_axes(world.matrix3.as_dmat3().to_cols_array_2d());
         let height_m = match camera.projection {
@@ -182,7 +182,7 @@ mod tests {
     fn the_corners_span_the_vertical_field_of_view() {
         let pose = pose(DQuat::IDENTITY, DVec3::ONE);
         for (width, height) in [(200, 100), (100, 100), (50, 100), (1, 1)] {
-            let rays = CameraRays::new(&camera(), &pose, width, height);
+            let rays = CameraRays::new(&camera(), &pose, [width, height]);
             let corner = rays.ray(0, 0, Vec2::ZERO, MIDDLE);
             assert_eq!(corner.origin, Vec3::new(1.0, 2.0, 3.0));
             let aspect = width as f32 / height as f32;
@@ -198,7 +198,7 @@ mod tests {
     fn it_turns_with_its_node_and_ignores_scale() {
         let rotation = DQuat::from_rotation_y(std::f64::consts::FRAC_PI_2);
         for scale in [DVec3::ONE, DVec3::new(3.0, 0.1, 7.0)] {
-            let rays = CameraRays::new(&camera(), &pose(rotation, scale), 2, 2);
+            let rays = CameraRays::new(&camera(), &pose(rotation, scale), [2, 2]);
             let ahead = rays.ray(1, 1, Vec2::ZERO, MIDDLE).direction;
             assert!((ahead + Vec3::X).length() < 1e-6, "{ahead}");
             let top = rays.ray(1, 0, Vec2::ZERO, MIDDLE).direction;
@@ -220,7 +220,7 @@ mod tests {
         for linear in [shear, stretched, stretched * turn, mirrored, backwards] {
             for scale in [1e-30, 1e-9, 1.0, 1e9, 1e30] {
                 let pose = posed(Trs::Matrix(DAffine3::from_mat3(linear * scale)));
-                let rays = CameraRays::new(&camera(), &pose, 20, 10);
+                let rays = CameraRays::new(&camera(), &pose, [20, 10]);
                 let ahead = (linear * -DVec3::Z).normalize().as_vec3();
                 assert!((rays.forward - ahead).length() < 1e-6, "{linear} {scale}");
                 assert!(rays.up.dot((linear * DVec3::Y).as_vec3()) > 0.0);
@@ -232,7 +232,7 @@ mod tests {
             let mut scale = DVec3::ONE;
             scale[lost] = 0.0;
             let pose = posed(Trs::Matrix(DAffine3::from_mat3(turn * DMat3::from_diagonal(scale))));
-            let rays = CameraRays::new(&camera(), &pose, 20, 10);
+            let rays = CameraRays::new(&camera(), &pose, [20, 10]);
             assert!((rays.forward + turn.z_axis.as_vec3()).length() < 1e-6, "{lost}");
             assert!((rays.up - turn.y_axis.as_vec3()).length() < 1e-6, "{lost}");
             assert_view(&rays);
@@ -242,8 +242,7 @@ mod tests {
             assert_view(&CameraRays::new(
                 &camera(),
                 &posed(Trs::Matrix(DAffine3::from_mat3(linear))),
-                2,
-                2,
+                [2, 2],
             ));
         }
     }
@@ -261,7 +260,7 @@ mod tests {
         let node =
             pose(DQuat::from_rotation_y(std::f64::consts::FRAC_PI_2), DVec3::new(1.0, 5.0, 2.0));
         let camera = Camera { film_offset: [0.25, 0.0], ..Camera::orthographic(0, 6.0) };
-        let rays = CameraRays::new(&camera, &node, 40, 20);
+        let rays = CameraRays::new(&camera, &node, [40, 20]);
         // The camera looks along -X from (1, 2, 3): right is -Z. It sees 12 m by 6 m.
         for (x, y, u) in [(0, 0, Vec2::ZERO), (39, 19, Vec2::ONE), (20, 10, Vec2::ZERO)] {
             let ray = rays.ray(x, y, u, MIDDLE);
@@ -280,10 +279,10 @@ mod tests {
         let cameras =
             [camera(), Camera { lens_radius_m: 0.2, ..camera() }, Camera::orthographic(0, 3.0)];
         for camera in cameras {
-            let whole = CameraRays::new(&camera, &pose, 16, 8).ray(2, 1, MIDDLE, Vec2::ZERO);
+            let whole = CameraRays::new(&camera, &pose, [16, 8]).ray(2, 1, MIDDLE, Vec2::ZERO);
             assert_eq!(whole.reach_m, f32::INFINITY);
             let camera = Camera { clip_m: [0.5, 20.0], ..camera };
-            let rays = CameraRays::new(&camera, &pose, 16, 8);
+            let rays = CameraRays::new(&camera, &pose, [16, 8]);
             let ray = rays.ray(2, 1, MIDDLE, Vec2::ZERO);
             assert!((rays.depth_m(ray.origin) - 0.5).abs() < 1e-5);
             assert!((rays.depth_m(ray.origin + ray.direction * ray.reach_m) - 20.0).abs() < 1e-4);
@@ -295,7 +294,7 @@ mod tests {
     #[test]
     fn the_film_moves_by_its_own_size() {
         let offset = Camera { film_offset: [0.5, 0.25], ..camera() };
-        let rays = CameraRays::new(&offset, &pose(DQuat::IDENTITY, DVec3::ONE), 200, 100);
+        let rays = CameraRays::new(&offset, &pose(DQuat::IDENTITY, DVec3::ONE), [200, 100]);
         let center = rays.ray(100, 50, Vec2::ZERO, MIDDLE).direction;
         let expected = Vec3::new(2.0, 0.5, -1.0).normalize();
         assert!((center - expected).length() < 1e-6, "{center}");
@@ -305,8 +304,8 @@ mod tests {
     fn all_rays_of_a_lens_meet_in_the_plane_of_focus() {
         let lens = Camera { lens_radius_m: 0.2, ..camera() };
         let pose = pose(DQuat::from_rotation_x(0.4), DVec3::ONE);
-        let rays = CameraRays::new(&lens, &pose, 64, 48);
-        let pinhole = CameraRays::new(&camera(), &pose, 64, 48);
+        let rays = CameraRays::new(&lens, &pose, [64, 48]);
+        let pinhole = CameraRays::new(&camera(), &pose, [64, 48]);
         for (x, y) in [(0, 0), (32, 24), (63, 10)] {
             let straight = pinhole.ray(x, y, MIDDLE, MIDDLE);
             let reach = 4.0 / straight.direction.dot(pinhole.forward);

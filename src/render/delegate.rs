@@ -6,6 +6,7 @@ use super::direct::FoundByReflection;
 use super::far_field::StillTables;
 use super::film::{Film, Shown, half_of};
 use super::fog::Fog;
+use super::frame_times::FrameTimes;
 use super::layers::Aov;
 use super::links::{FrameLinks, ShotLinks};
 use super::motion::Motion;
@@ -13,14 +14,14 @@ use super::passes::{Control, Progress, Uniform};
 use super::path::{Integrator, PathScratch, TraceStats};
 use super::picker::LightPicker;
 use super::plan::{Plan, PlanError};
-use super::rays::{RayScene, Tracer};
+use super::rays::RayScene;
 use super::settings::RenderSettings;
 use super::surface::Surfaces;
 use crate::emitter::{Emitters, InfiniteLight, PosedEmitters, Skies};
 use crate::light_tree::learned::Learned;
 use crate::light_tree::{LightTree, NoSuchFrame};
 use crate::math::random::{hash, stratified};
-use crate::scene::{Camera, Pose, Scene};
+use crate::scene::{Camera, Scene};
 use rayon::prelude::*;
 use thiserror::Error;
 
@@ -144,111 +145,92 @@ impl<'a> RenderDelegate<'a> {
         learned: Option<&Learned>,
         work: impl FnOnce(&Integrator) -> T,
     ) -> Result<T, NoSuchFrame> {
-        let pose = [self.pose(frame.into())];
-        self.at_poses(tree, frame, &pose, learned, |integrators| work(&integrators[0]))
+        let size = [self.settings.width, self.settings.height];
+        let instant = FrameTimes::instant(self.scene, &self.camera, frame.into(), size);
+        self.at_times(tree, frame, &instant, learned, |integrators| work(&integrators[0]))
     }
 
-    /// Calls `work` with a frame that is ready to be traced at each of some poses. Lights at infinity are as they are
-    /// at the frame itself: the picture of a dome is laid out once.
-    fn at_poses<T>(
+    /// Does what is done for a frame before its first sample.
+    ///
+    /// # Errors
+    /// As [`at_frame`](Self::at_frame).
+    ///
+    /// # Panics
+    /// As [`at_frame`](Self::at_frame).
+    pub fn prepare(
         &self,
         tree: &LightTree<impl AsRef<[u8]>>,
         frame: i32,
-        poses: &[Pose],
+    ) -> Result<(), NoSuchFrame> {
+        self.at_times(tree, frame, &self.times(frame), self.learned.as_ref(), |_| ())
+    }
+
+    /// When a frame is seen.
+    fn times(&self, frame: i32) -> FrameTimes {
+        let (scene, camera) = (self.scene, &self.camera);
+        let size = [self.settings.width, self.settings.height];
+        match self.settings.motion_blur {
+            true => FrameTimes::of_shutter(scene, camera, frame, size),
+            false => FrameTimes::instant(scene, camera, frame.into(), size),
+        }
+    }
+
+    /// Calls `work` with a frame that is ready to be traced at each of some times. Lights at infinity, and what the tree
+    /// is told of far fields, are as they are in the middle: these are laid out once.
+    fn at_times<T>(
+        &self,
+        file: &LightTree<impl AsRef<[u8]>>,
+        frame: i32,
+        times: &FrameTimes,
         learned: Option<&Learned>,
         work: impl FnOnce(&[Integrator]) -> T,
     ) -> Result<T, NoSuchFrame> {
-        assert_eq!(tree.emitter_count(), self.emitters.len(), "the tree belongs to another scene");
-        let learned = learned.filter(|learned| learned.tree == tree.still_key());
-        let infinite = match poses {
-            [pose] => self.skies.lights(self.scene, pose),
-            _ => self.skies.lights(self.scene, &self.pose(frame.into())),
-        };
-        let tracers = self.tracers(poses);
-        let at_pose = |pose| PosedEmitters { scene: self.scene, emitters: self.emitters, pose };
-        let emitters: Vec<PosedEmitters> = poses.iter().map(at_pose).collect();
-        // A single tracer is that of all poses.
-        let tracer_of = tracers.iter().chain(std::iter::repeat(&tracers[0]));
-        let integrators = emitters.iter().zip(tracer_of).map(|(emitters, tracer)| {
-            self.integrator(tree, frame, (emitters, tracer, &infinite), learned)
-        });
-        Ok(work(&integrators.collect::<Result<Vec<_>, _>>()?))
-    }
-
-    /// What rays hit in some poses: of each, or once if they differ in nothing that a ray can hit.
-    fn tracers(&self, poses: &[Pose]) -> Vec<Tracer<'_>> {
-        let alike = |pose: &Pose| self.scene.has_all_in_place(&poses[0], pose);
-        let several = if poses[1..].iter().all(alike) { &poses[..1] } else { poses };
-        several.par_iter().map(|pose| self.geometry.for_pose(self.scene, pose)).collect()
-    }
-
-    fn integrator<'s>(
-        &'s self,
-        file: &'s LightTree<impl AsRef<[u8]>>,
-        frame: i32,
-        (emitters, tracer, infinite): (
-            &'s PosedEmitters<'s>,
-            &'s Tracer<'s>,
-            &'s [InfiniteLight<'s>],
-        ),
-        learned: Option<&Learned<'s>>,
-    ) -> Result<Integrator<'s>, NoSuchFrame> {
-        let pose = emitters.pose;
+        let RenderDelegate { scene, emitters, settings, .. } = self;
+        assert_eq!(file.emitter_count(), emitters.len(), "the tree belongs to another scene");
+        let learned = learned.filter(|learned| learned.tree == file.still_key());
+        let infinite = self.skies.lights(scene, times.middle());
+        let at_pose = |pose| PosedEmitters { scene, emitters, pose };
+        let middle = at_pose(times.middle());
         let tree = match &self.links {
             Some(links) => file.at_frame_linked(frame, links.lit_by())?,
             None => file.at_frame(frame)?,
         };
-        let tree = match self.scene.profiles.is_empty() {
+        let tree = match scene.profiles.is_empty() {
             true => tree,
-            false => self.far_fields.told(file, tree, emitters),
+            false => self.far_fields.told(file, tree, &middle),
         };
         let tree = match learned {
             Some(learned) => tree.veiled(learned.veils),
             None => tree,
         };
-        let links = self.links.as_ref().map(|shot| FrameLinks { shot, infinite });
-        let (width, height) = (self.settings.width, self.settings.height);
-        Ok(Integrator {
-            settings: &self.settings,
-            tracer,
-            surfaces: Surfaces::new(self.scene, pose),
-            emitters: *emitters,
-            infinite,
-            picker: LightPicker::new(&self.settings, tree, infinite).linked(links),
-            links,
-            camera: CameraRays::new(&self.camera, pose, width, height),
-            cells: learned.map(|learned| learned.cells),
-            fog: Fog::new(self.scene, pose, &self.camera),
-            groups: self.plan.as_ref().ok().and_then(|plan| plan.groups.as_ref()),
-            found_by_reflection: match self.settings.mis {
-                true if infinite.iter().any(InfiniteLight::meets_reflections) => {
-                    FoundByReflection::Everything
-                }
-                true if self.has_surfaces_that_shine => FoundByReflection::Surfaces,
-                _ => FoundByReflection::Nothing,
-            },
-        })
-    }
-
-    /// Where everything is at a frame, which may be between two whole ones.
-    fn pose(&self, frame: f64) -> Pose {
-        self.scene.pose_at(self.scene.timeline.seconds_at(frame))
-    }
-
-    /// The times at which the camera sees a frame: one, if it has no shutter or nothing changes while that is
-    /// open.
-    fn times(&self, frame: i32) -> Vec<(f64, Pose)> {
-        let instant = || (f64::from(frame), self.pose(frame.into()));
-        if !self.settings.motion_blur {
-            return vec![instant()];
-        }
-        let times = self.scene.times_of(&self.camera, frame).into_iter();
-        let times: Vec<(f64, Pose)> = times.map(|time| (time, self.pose(time))).collect();
-        let (_, first) = &times[0];
-        match times.iter().all(|(_, pose)| pose == first) {
-            true => vec![instant()],
-            false => times,
-        }
+        let links = self.links.as_ref().map(|shot| FrameLinks { shot, infinite: &infinite });
+        let picker = LightPicker::new(settings, tree, &infinite).linked(links);
+        let tracers = self.geometry.for_poses(scene, times.poses());
+        let integrator = |(view, camera): (usize, &CameraRays)| {
+            let pose = &times.poses()[times.pose_of(view)];
+            Integrator {
+                settings,
+                tracer: &tracers[times.pose_of(view)],
+                surfaces: Surfaces::new(scene, pose),
+                emitters: at_pose(pose),
+                infinite: &infinite,
+                picker: picker.clone(),
+                links,
+                camera: *camera,
+                cells: learned.map(|learned| learned.cells),
+                fog: Fog::new(scene, pose, &self.camera),
+                groups: self.plan.as_ref().ok().and_then(|plan| plan.groups.as_ref()),
+                found_by_reflection: match settings.mis {
+                    true if infinite.iter().any(InfiniteLight::meets_reflections) => {
+                        FoundByReflection::Everything
+                    }
+                    true if self.has_surfaces_that_shine => FoundByReflection::Surfaces,
+                    _ => FoundByReflection::Nothing,
+                },
+            }
+        };
+        let integrators: Vec<Integrator> = times.views.iter().enumerate().map(integrator).collect();
+        Ok(work(&integrators))
     }
 
     /// A film for a frame that has no samples yet.
@@ -298,15 +280,16 @@ impl<'a> RenderDelegate<'a> {
         progress: &impl Progress,
     ) -> Result<RenderedFrame, RenderError> {
         let plan = self.plan.as_ref().map_err(Clone::clone)?;
-        let (times, poses): (Vec<f64>, Vec<Pose>) = self.times(frame).into_iter().unzip();
-        self.at_poses(tree, frame, &poses, self.learned.as_ref(), |integrators| {
+        let times = self.times(frame);
+        self.at_times(tree, frame, &times, self.learned.as_ref(), |integrators| {
             let size = [self.settings.width, self.settings.height];
-            let shows_motion = plan.layers.iter().any(|layer| layer.aov == Aov::Motion);
-            let shown = times.iter().zip(&poses).map(|(&time, pose)| Shown {
+            let motion = || Motion::new(self.scene, times.middle(), &self.camera, times.time, size);
+            let motion = plan.layers.iter().any(|layer| layer.aov == Aov::Motion).then(motion);
+            let shown = integrators.iter().map(|integrator| Shown {
                 layers: &plan.layers,
                 origin: self.scene.origin,
-                motion: shows_motion
-                    .then(|| Motion::new(self.scene, pose, &self.camera, time, size)),
+                pose: integrator.emitters.pose,
+                motion: motion.as_ref(),
                 ids: plan.ids.as_ref(),
             });
             let shown: Vec<Shown> = shown.collect();

@@ -40,6 +40,7 @@ mod far_field;
 pub mod film;
 pub mod fog;
 pub mod frame_names;
+mod frame_times;
 pub mod frames;
 pub mod knob;
 pub mod layers;

@@ -4,7 +4,7 @@
 //! the place in the next frame, `backward` to the place in the last one. Camera and rigid motion at the
 //! first hit count; reflections do not. Both ends are projected through the middle of the lens, so what
 //! stands still has exactly zero. What is infinitely far turns with the camera. Beyond the shot's keys
-//! nothing moves.
+//! nothing moves. In a frame that is blurred, the motion is that of the middle of the time.
 
 use super::camera::CameraRays;
 use super::path::PathSample;
@@ -29,9 +29,9 @@ impl<'a> Motion<'a> {
         pose: &'a Pose,
         camera: &Camera,
         frame: f64,
-        [width, height]: [u32; 2],
+        size: [u32; 2],
     ) -> Motion<'a> {
-        let rays = |pose: &Pose| CameraRays::new(camera, pose, width, height);
+        let rays = |pose: &Pose| CameraRays::new(camera, pose, size);
         let neighbours = [1.0, -1.0].map(|step| {
             let pose = scene.pose_at(scene.timeline.seconds_at(frame + step));
             let rays = rays(&pose);
@@ -40,9 +40,9 @@ impl<'a> Motion<'a> {
         Motion { scene, pose, camera: rays(pose), neighbours }
     }
 
-    /// `forward` and `backward` of what a path has hit first. Zero where a neighbour does not have it in
-    /// front of the camera.
-    pub fn of(&self, sample: &PathSample) -> [DVec2; 2] {
+    /// `forward` and `backward` of what a path has hit first in a pose of the frame. Zero where a neighbour does not
+    /// have it in front of the camera.
+    pub fn of(&self, sample: &PathSample, pose: &Pose) -> [DVec2; 2] {
         let Some(hit) = &sample.hit else {
             let at = |camera: &CameraRays| camera.project_direction(sample.direction);
             let here = at(&self.camera);
@@ -53,8 +53,8 @@ impl<'a> Motion<'a> {
             HitSurface::Sphere { light } => self.scene.lights[light as usize].node,
         };
         let point = hit.anchor.position;
-        let here = self.camera.project(point.as_dvec3());
-        let own = self.pose.world(node);
+        let own = pose.world(node);
+        let here = self.camera.project(carried(point, own, self.pose.world(node)));
         self.neighbours.each_ref().map(|(pose, camera)| {
             let there = carried(point, own, pose.world(node));
             moved(here, camera.project(there))

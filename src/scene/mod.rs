@@ -109,12 +109,15 @@ impl Scene {
         Pose::evaluate(self, time_s).0
     }
 
-    /// Whether all that a ray can hit is in the same place in two poses.
-    pub fn has_all_in_place(&self, one: &Pose, other: &Pose) -> bool {
+    /// Whether two poses differ in nothing but from where the scene is seen, and in lights at infinity.
+    pub fn is_alike(&self, one: &Pose, other: &Pose) -> bool {
         let instances = self.instances.iter().map(|instance| instance.node);
-        let lights = self.lights.iter().filter(|light| !light.kind.is_infinite());
-        let mut nodes = instances.chain(lights.map(|light| light.node));
+        let lights = || (0..).zip(&self.lights).filter(|(_, light)| !light.kind.is_infinite());
+        let fog = self.medium.iter().filter_map(|medium| Some(medium.region?.node));
+        let mut nodes = instances.chain(lights().map(|(_, light)| light.node)).chain(fog);
         nodes.all(|node| one.world(node) == other.world(node))
+            && lights().all(|(row, _)| one.light_rgb(row) == other.light_rgb(row))
+            && one.instance_rgb == other.instance_rgb
     }
 
     /// Whether any light but those at infinity moves, or varies in strength.

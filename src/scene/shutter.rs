@@ -2,7 +2,8 @@
 //!
 //! What a shutter sees is the mean over the time that it is open. A frame is posed at some of its times, as many as
 //! the scene's size allows, and every sample of a pixel is taken at one of them (Cook, Porter and Carpenter 1984).
-//! The times are the scene's and the frame's alone, so that a light tree can be built that holds all of them.
+//! The times are the scene's and the frame's alone, so that a light tree can be built that holds all of them. A camera
+//! that moves by itself sees more of them, for that costs nothing.
 
 use super::{Camera, Scene};
 
@@ -10,7 +11,7 @@ use super::{Camera, Scene};
 const MOST_TIMES: usize = 128;
 /// ...and so many at least...
 const FEWEST_TIMES: usize = 8;
-/// ...for so many poses of instances and lights in all.
+/// ...for so many poses of instances, lights, and triangles of mesh lights that move, in all.
 const MOST_POSES: usize = 1 << 21;
 
 /// When a shutter is open, in frames from the frame that is rendered on. It is open for a while.
@@ -45,6 +46,14 @@ impl Scene {
         }
     }
 
+    /// The same for a camera that sees nothing move.
+    pub fn times_of_view(&self, camera: &Camera, frame: i32) -> Vec<f64> {
+        match camera.shutter {
+            Some(shutter) => shutter.times(frame, MOST_TIMES).collect(),
+            None => vec![f64::from(frame)],
+        }
+    }
+
     /// The times at which any of the scene's cameras sees a frame, with its shutter or without: the frame comes
     /// first.
     pub fn times_of_all(&self, frame: i32) -> Vec<f64> {
@@ -64,9 +73,18 @@ impl Scene {
         shutters
     }
 
-    /// A power of two. Cameras and nodes do not count: one that is added must change no other picture.
+    /// A power of two. Cameras and nodes do not count: a view that is added changes no picture.
     fn times_of_a_frame(&self) -> usize {
-        let posed = self.instances.len() + self.lights.len();
+        let moving = self.moving_nodes();
+        let shines = |row: usize| self.peak_rgb_of_instance(row as u32).max_element() > 0.0;
+        let moving_lights = self
+            .instances
+            .iter()
+            .enumerate()
+            .filter(|(row, instance)| moving[instance.node as usize] && shines(*row));
+        let triangles =
+            moving_lights.map(|(_, row)| self.meshes[row.mesh as usize].triangles.len());
+        let posed = self.instances.len() + self.lights.len() + triangles.sum::<usize>();
         let times = (MOST_POSES / posed.max(1)).clamp(FEWEST_TIMES, MOST_TIMES);
         1 << times.ilog2()
     }
@@ -83,7 +101,7 @@ mod tests {
         assert_eq!(scene.times_of(&camera, 7), [7.0]);
         camera.shutter = Shutter::new(-0.25, 0.75);
         let times = scene.times_of(&camera, 7);
-        assert_eq!(times.len(), MOST_TIMES);
+        assert_eq!((times.len(), &times), (MOST_TIMES, &scene.times_of_view(&camera, 7)));
         assert_eq!(times[0], 6.75 + 0.5 / 128.0);
         assert!(times.windows(2).all(|pair| (pair[1] - pair[0] - 1.0 / 128.0).abs() < 1e-12));
         // A second camera of the same shutter adds none; that of another one does.

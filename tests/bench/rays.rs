@@ -36,7 +36,7 @@ fn main() {
     let emitters = Emitters::collect(&scene);
     let posed = PosedEmitters { scene: &scene, emitters: &emitters, pose: &pose };
     let camera = scene.cameras.first().expect("a scene with a camera");
-    let cameras = CameraRays::new(camera, &pose, WIDTH, HEIGHT);
+    let cameras = CameraRays::new(camera, &pose, [WIDTH, HEIGHT]);
     let primary = camera_rays(&cameras);
     let prepared = RayScene::new(&scene, &pose);
     let tracer = prepared.for_pose(&scene, &pose);

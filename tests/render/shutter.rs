@@ -2,7 +2,7 @@
 
 use crate::moving::{carousel, flicker};
 use crate::rooms;
-use crate::stage::{Set, Stage, by, direct, glow};
+use crate::stage::{Set, Stage, at, by, direct, facing, glow, lambert};
 use crate::statistics::Estimate;
 use crate::strategies::{SIZE, disagreement, render};
 use candelabra::emitter::PosedEmitters;
@@ -10,7 +10,9 @@ use candelabra::light_tree::Receiver;
 use candelabra::pipeline;
 use candelabra::render::buffers::RenderBuffers;
 use candelabra::render::{Aov, LightStrategy, RenderDelegate, RenderSettings, Window};
-use candelabra::scene::{Camera, Channel, Interpolation, Keys, Scene, Shutter, Trs};
+use candelabra::scene::{
+    Camera, Channel, Interpolation, Keys, LightKind, Material, Scene, Shutter, Trs,
+};
 use glam::{DVec3, Vec2, Vec3};
 
 /// The only frame; it is second 0.
@@ -163,6 +165,64 @@ fn where_nothing_moves_a_shutter_changes_nothing() {
     let set = Set::of(&stage.scene, &[FRAME]);
     let instant = RenderSettings { motion_blur: false, ..settings.clone() };
     assert!(set.render(&settings, FRAME) == set.render(&instant, FRAME));
+}
+
+/// The strengths of the panel and of the bulb of a still room, step by step.
+fn lit(values: [f32; 2]) -> Option<Keys<Vec3>> {
+    let values = values.map(|value| Vec3::splat(value)).into();
+    Some(Keys { times_s: vec![0.0, 0.5], values, interpolation: Interpolation::Step })
+}
+
+/// Rays must find a lamp that is dark at first, and lose one that goes out, though nothing moves: it is all as if
+/// something moved far away.
+#[test]
+fn a_lamp_that_is_lit_for_half_the_time_gives_half_its_light() {
+    for values in [[0.0, 4.0], [4.0, 0.0]] {
+        for moves in [false, true] {
+            let mut stage = Stage::default();
+            stage.quad([1.0, 1.0], glow(Vec3::ONE), Trs::default()).values = lit(values);
+            let radiance_nits = Vec3::ONE;
+            let ball = LightKind::Sphere { radiance_nits, radius: 0.6, shaping: None };
+            stage.light(ball, at(DVec3::X * 1.2)).values = lit(values);
+            stage.quad([0.1, 0.1], lambert(Vec3::ONE), at(DVec3::Z * 90.0));
+            let mirror = Material { metallic: 1.0, roughness: 0.1, ..Material::default() };
+            stage.quad([9.0, 9.0], mirror, facing(DVec3::NEG_Y * 0.7, DVec3::ZERO));
+            if moves {
+                let far = drift(Vec3::Z * 90.0, Vec3::new(1.0, 0.0, 90.0));
+                stage.scene.nodes[2].channels = far;
+            }
+            stage.look(DVec3::new(0.6, 0.2, 3.0), DVec3::new(0.6, -0.2, 0.0), 1.0);
+            let stage = open(stage);
+            let settings = RenderSettings { samples: 256, ..settings(LightStrategy::Tree, 3) };
+            let blurred = luminances(&stage.render(&settings));
+            let mut always = Stage { scene: stage.scene };
+            always.scene.instances[0].values = lit([2.0, 2.0]);
+            always.scene.lights[0].values = lit([2.0, 2.0]);
+            let expected = luminances(&always.render(&settings));
+            let all = |picture: &[f64]| picture.iter().sum::<f64>();
+            let ratio = all(&blurred) / all(&expected);
+            assert!((ratio - 1.0).abs() < 0.02, "{values:?} {moves}: {ratio}");
+        }
+    }
+}
+
+/// What a shutter shows is what is there while it is open, and not what is there at its frame.
+#[test]
+fn a_shutter_may_be_open_away_from_its_frame() {
+    let mut stage = Stage::default();
+    stage.quad([8.0, 8.0], glow(Vec3::ONE), Trs::default());
+    stage.look(DVec3::Z * 3.0, DVec3::ZERO, 1.0);
+    let step = |from, to| {
+        let (times_s, values) = (vec![0.0, 0.5 / 24.0], vec![from, to]);
+        vec![Channel::Translation(Keys { times_s, values, interpolation: Interpolation::Step })]
+    };
+    stage.scene.nodes[0].channels = step(Vec3::ZERO, Vec3::X * 100.0);
+    let settings = RenderSettings { depth: 0, ..direct(8, 4) };
+    for (shutter, seen) in [((0.0, 0.4), 1.0), ((0.6, 0.9), 0.0), ((-0.4, 0.0), 1.0)] {
+        stage.scene.cameras[0].shutter = Shutter::new(shutter.0, shutter.1);
+        let picture = Set::of(&stage.scene, &[FRAME]).render(&settings, FRAME);
+        assert!(picture.beauty().all(|rgb| rgb.x == seen), "{shutter:?}");
+    }
 }
 
 #[test]

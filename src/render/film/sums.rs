@@ -5,16 +5,19 @@ use super::super::layers::{Aov, Layer};
 use super::super::motion::Motion;
 use super::super::path::PathSample;
 use crate::math::color::Rgb;
+use crate::scene::Pose;
 use glam::{DVec2, DVec3};
 
-/// What the layers of a frame need beside the samples.
+/// What the layers of a frame need beside the samples, at one of its times.
 pub(in super::super) struct Shown<'a> {
     /// What is asked for.
     pub layers: &'a [Layer],
     /// Where the scene's origin is, metres.
     pub origin: DVec3,
+    /// Where everything is.
+    pub pose: &'a Pose,
     /// Only for the layers of motion.
-    pub motion: Option<Motion<'a>>,
+    pub motion: Option<&'a Motion<'a>>,
     /// Only for Cryptomatte.
     pub ids: Option<&'a ObjectIds>,
 }
@@ -115,8 +118,8 @@ impl Layout {
                 add(sums, at + 3 * i, *light);
             }
         }
-        if let (Some(at), Some(motion)) = (self.motion, &shown.motion) {
-            let [forward, backward] = motion.of(sample);
+        if let (Some(at), Some(motion)) = (self.motion, shown.motion) {
+            let [forward, backward] = motion.of(sample, shown.pose);
             let numbers = [forward.x, forward.y, backward.x, backward.y];
             sums[at..].iter_mut().zip(numbers).for_each(|(sum, own)| *sum += own);
         }

@@ -18,6 +18,7 @@ use crate::math::built_in;
 use crate::math::random::{hash, widen};
 use compared::running_power;
 use glam::Vec3;
+use std::sync::Arc;
 
 /// A light, picked.
 #[derive(Clone, Copy, Debug)]
@@ -124,6 +125,7 @@ macro_rules! with_viewer {
 }
 
 /// Picks lights for one frame.
+#[derive(Clone)]
 pub struct LightPicker<'a> {
     strategy: LightStrategy,
     /// Of a path's points, by how many bounces lie before them; the last is that of all later ones.
@@ -133,7 +135,7 @@ pub struct LightPicker<'a> {
     /// Which lights light what, if not all light everything.
     links: Option<FrameLinks<'a>>,
     /// Running sums of energy over emitters, then lights at infinity; only for the power strategy.
-    running_power: Vec<f64>,
+    running_power: Arc<[f64]>,
 }
 
 impl PickScratch {
@@ -155,6 +157,7 @@ impl<'a> LightPicker<'a> {
         let strategy = settings.strategy;
         let by_power = strategy == LightStrategy::Power;
         let running_power = if by_power { running_power(&tree, infinite) } else { Vec::new() };
+        let running_power = running_power.into();
         let splitting = std::array::from_fn(|bounce| settings.splitting(bounce as u32));
         LightPicker { strategy, splitting, tree, infinite, links: None, running_power }
     }

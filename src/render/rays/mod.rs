@@ -1,9 +1,9 @@
 //! The ray kernel: what a ray hits, and whether anything stands between two points.
 //!
 //! Two levels. [`RayScene`] is prepared once for a shot: one world-space set of triangles for all
-//! that stands still, and one local-space set for each mesh that moves or is shared by so many
-//! instances that copies would cost memory. [`Tracer`] is one frame of it: a small tree over the
-//! placed meshes and the sphere lights, built for a [`Pose`].
+//! that stands still, one local-space set for each mesh that moves or is shared by so many
+//! instances that copies would cost memory, and a small tree over the placed meshes and the sphere lights
+//! that stand still. [`Tracer`] is one time of it: another such tree over those that move, built for a [`Pose`].
 //!
 //! What callers may rely on:
 //!
@@ -27,6 +27,7 @@ mod anchor;
 mod binary_bvh;
 mod blas;
 mod meeting;
+mod placing;
 mod prim;
 mod shining;
 mod sight;
@@ -43,9 +44,10 @@ pub use prim::Sender;
 pub use sight::{Seen, SeenLight};
 pub use tracer::{Caster, Tracer};
 
-use crate::scene::{Instance, Mesh, Pose, Scene};
+use crate::scene::{Instance, LightKind, Mesh, Pose, Scene};
 use blas::{Blas, TriangleId};
 use glam::{DAffine3, DMat3, Vec3};
+use placing::{Placing, Rows};
 use rayon::prelude::*;
 use shining::Shining;
 use std::collections::HashMap;
@@ -64,24 +66,21 @@ pub struct RayScene {
     shining: Shining,
     /// Sets in local space.
     shared: Vec<Blas>,
-    /// Instances of the shared sets.
-    placed: Vec<Placed>,
+    /// What of the instances of shared sets and of the sphere lights stands still.
+    standing: Placing,
+    /// And what of them moves.
+    moving: Rows,
     /// By instance: its place in the order of paths.
     ranks: Vec<u32>,
-}
-
-/// An instance that refers to a shared set.
-#[derive(Clone, Copy, Debug)]
-struct Placed {
-    instance: u32,
-    set: u32,
 }
 
 impl RayScene {
     /// Prepares what does not change in a shot. `pose` may be that of any of its frames.
     pub fn new(scene: &Scene, pose: &Pose) -> RayScene {
         let is_kept = kept_in_own_space(scene);
-        let (mut placed, mut sets, mut flat) = (Vec::new(), HashMap::new(), Vec::new());
+        let moves = scene.moving_nodes();
+        let (mut standing, mut moving) = (Rows::default(), Rows::default());
+        let (mut sets, mut flat) = (HashMap::new(), Vec::new());
         let mut meshes = Vec::new();
         for (number, instance) in scene.instances.iter().enumerate() {
             let number = number as u32;
@@ -90,9 +89,16 @@ impl RayScene {
                     meshes.push(instance.mesh);
                     meshes.len() as u32 - 1
                 });
-                placed.push(Placed { instance: number, set });
+                let rows = if moves[instance.node as usize] { &mut moving } else { &mut standing };
+                rows.instances.push((number, set));
             } else {
                 flat.push(number);
+            }
+        }
+        for (row, light) in (0..).zip(&scene.lights) {
+            if matches!(light.kind, LightKind::Sphere { .. }) {
+                let rows = if moves[light.node as usize] { &mut moving } else { &mut standing };
+                rows.spheres.push(row);
             }
         }
         let local = |&mesh: &u32| {
@@ -106,18 +112,29 @@ impl RayScene {
         let triangles = parts.iter().flat_map(|part| &part.0).copied().collect::<Vec<_>>();
         let ids = parts.iter().flat_map(|part| &part.1).copied().collect::<Vec<_>>();
         drop(parts);
+        let shared: Vec<Blas> = meshes.par_iter().map(local).collect();
         RayScene {
             fixed: Blas::build(&triangles, &ids),
             shining,
-            shared: meshes.par_iter().map(local).collect(),
-            placed,
+            standing: Placing::new(scene, pose, &shared, &standing),
+            shared,
+            moving,
             ranks: ranks(&scene.instances),
         }
     }
 
     /// One frame: only what moves is placed anew. `scene` must be the one this was made of.
     pub fn for_pose(&self, scene: &Scene, pose: &Pose) -> Tracer<'_> {
-        Tracer::new(self, scene, pose)
+        Tracer::new(self, scene, pose, None)
+    }
+
+    /// Several poses, in their order; there is one at least.
+    pub fn for_poses(&self, scene: &Scene, poses: &[Pose]) -> Vec<Tracer<'_>> {
+        let first = self.for_pose(scene, &poses[0]);
+        let others = poses[1..].par_iter();
+        let others = others.map(|pose| Tracer::new(self, scene, pose, Some(&first)));
+        let others: Vec<Tracer> = others.collect();
+        std::iter::once(first).chain(others).collect()
     }
 }
 

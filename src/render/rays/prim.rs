@@ -26,7 +26,7 @@ pub(super) enum Role {
 }
 
 /// A prim at one time.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Prim {
     /// Its place in the order of paths: what decides where two surfaces are one.
     pub rank: u32,

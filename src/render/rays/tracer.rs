@@ -1,28 +1,30 @@
 //! One frame of the ray kernel.
 
-use super::blas::{Blas, LARGEST_COORDINATE, search_limit};
-use super::meeting::{Meeting, On, Space};
+use super::blas::search_limit;
+use super::meeting::{Meeting, On};
+use super::placing::{Item, Placing};
 use super::prim::{Prim, Sender};
-use super::shining::Shining;
 use super::sight::{Seen, SeenLight, Sight};
-use super::sphere::Sphere;
 use super::triangles::{Ray, barycentric};
-use super::wide_bvh::{BoxRay, NONE, WideBvh};
-use super::{Anchor, RayScene, in_world, may_shine, world_of};
-use crate::bounds::Aabb;
+use super::wide_bvh::BoxRay;
+use super::{Anchor, RayScene};
 use crate::math::built_in;
-use crate::scene::{LightKind, Pose, Scene};
-use glam::{DAffine3, DVec3, Vec2, Vec3};
+use crate::scene::{Pose, Scene};
+use glam::{DVec3, Vec2, Vec3};
+use std::sync::Arc;
 
 /// The geometry at one time. Made by [`RayScene::for_pose`]; shared by all threads.
 #[derive(Debug)]
 pub struct Tracer<'a> {
     scene: &'a RayScene,
-    tree: WideBvh,
-    /// Boxes of those that may shine.
-    shining: Shining,
-    /// What the leaves of the tree are.
-    items: Vec<Item<'a>>,
+    /// What moves.
+    moving: Placing,
+    prims: Arc<Prims>,
+}
+
+/// What rays must know of all prims.
+#[derive(Debug, PartialEq)]
+struct Prims {
     /// By instance.
     instances: Vec<Prim>,
     /// By light; only those of spheres are looked at.
@@ -38,67 +40,28 @@ pub enum Caster {
     Sphere(u32),
 }
 
-#[derive(Debug)]
-enum Item<'a> {
-    Sphere(Sphere),
-    Mesh {
-        instance: u32,
-        set: &'a Blas,
-        space: Space,
-    },
-    /// A mesh that its transform makes flat: it has no local space to search in.
-    Flattened {
-        set: Box<Blas>,
-    },
-}
-
 impl<'a> Tracer<'a> {
-    pub(super) fn new(prepared: &'a RayScene, scene: &Scene, pose: &Pose) -> Tracer<'a> {
-        let (mut boxes, mut unordered) = (Vec::new(), Vec::new());
-        let mut shining = Vec::new();
-        for placed in &prepared.placed {
-            let node = scene.instances[placed.instance as usize].node;
-            let to_world = world_of(pose, node);
-            let to_local = to_world.inverse();
-            let set = &prepared.shared[placed.set as usize];
-            let (item, bounds) = if to_local.is_finite() {
-                let bounds = set.bounds().map(|bounds| transform_box(&bounds, &to_world));
-                let space = Space { to_world, to_local };
-                (Item::Mesh { instance: placed.instance, set, space }, bounds)
-            } else {
-                let (triangles, ids) = in_world(scene, pose, placed.instance);
-                let set = Box::new(Blas::build(&triangles, &ids));
-                let bounds = set.bounds();
-                (Item::Flattened { set }, bounds)
-            };
-            if let Some(bounds) = bounds.filter(is_sound) {
-                shining.extend(may_shine(scene, placed.instance).then_some(bounds));
-                boxes.push(bounds);
-                unordered.push(item);
-            }
-        }
-        for sphere in spheres(scene, pose) {
-            let radius = DVec3::splat(sphere.radius_m);
-            let bounds = outward(sphere.center - radius, sphere.center + radius);
-            if is_sound(&bounds) {
-                let may_shine = scene.peak_rgb_of_light(sphere.light).max_element() > 0.0;
-                shining.extend(may_shine.then_some(bounds));
-                boxes.push(bounds);
-                unordered.push(Item::Sphere(sphere));
-            }
-        }
-        let (tree, leaves) = WideBvh::build(&boxes, 1);
-        let mut unordered: Vec<_> = unordered.into_iter().map(Some).collect();
-        let order = leaves.iter().map(|leaf| leaf[0]).filter(|&item| item != NONE);
-        let items = order.filter_map(|item| unordered[item as usize].take()).collect();
+    /// `alike` is another tracer of the same scene, if there is one: what is the same is shared with it.
+    pub(super) fn new(
+        prepared: &'a RayScene,
+        scene: &Scene,
+        pose: &Pose,
+        alike: Option<&Tracer>,
+    ) -> Tracer<'a> {
         let ranks = &prepared.ranks;
         let instance = |row: u32| Prim::instance(scene, pose, row, ranks[row as usize]);
         let of_instances = scene.instances.len() as u32;
         let light = |row: u32| Prim::sphere(scene, pose, row, of_instances + row);
-        let instances = (0..of_instances).map(instance).collect();
-        let lights = (0..scene.lights.len() as u32).map(light).collect();
-        let shining = Shining::around(&shining);
-        Tracer { scene: prepared, tree, shining, items, instances, lights }
+        let prims = Prims {
+            instances: (0..of_instances).map(instance).collect(),
+            lights: (0..scene.lights.len() as u32).map(light).collect(),
+        };
+        let prims = match alike.filter(|other| *other.prims == prims) {
+            Some(other) => other.prims.clone(),
+            None => Arc::new(prims),
+        };
+        let moving = Placing::new(scene, pose, &prepared.shared, &prepared.moving);
+        Tracer { scene: prepared, moving, prims }
     }
 
     /// What a ray sees at distances in `(0, tmax)`, in lengths of `direction`; the lights among it go
@@ -128,7 +91,8 @@ impl<'a> Tracer<'a> {
     /// Whether a ray may meet a prim that shines, hidden or not. If not, [`look`](Self::look) finds no light.
     pub fn may_meet_light(&self, origin: Vec3, direction: Vec3) -> bool {
         let ray = BoxRay::new(origin, direction);
-        self.shining.may_be_met(&ray) || self.scene.shining.may_be_met(&ray)
+        let parts = [&self.scene.shining, &self.scene.standing.shining, &self.moving.shining];
+        parts.into_iter().any(|part| part.may_be_met(&ray))
     }
 
     /// Whether anything that casts shadows stands at a distance in `(0, tmax)`, in lengths of
@@ -223,34 +187,40 @@ impl<'a> Tracer<'a> {
             return;
         }
         let box_ray = BoxRay::new(ray.origin.as_vec3(), ray.direction.as_vec3());
-        self.tree.walk::<ORDERED>(&box_ray, search_limit(tmax), |item| {
-            match &self.items[item as usize] {
-                Item::Sphere(sphere) => {
-                    if let Some(t) = sphere.distance(ray, tmax) {
-                        tmax = met(&Meeting { t, on: On::Sphere(sphere) });
+        for placing in [&self.scene.standing, &self.moving] {
+            placing.tree.walk::<ORDERED>(&box_ray, search_limit(tmax), |item| {
+                match &placing.items[item as usize] {
+                    Item::Sphere(sphere) => {
+                        if let Some(t) = sphere.distance(ray, tmax) {
+                            tmax = met(&Meeting { t, on: On::Sphere(sphere) });
+                        }
                     }
-                }
-                Item::Mesh { .. } if !built_in::INSTANCES => {}
-                Item::Mesh { instance, set, space } => {
-                    set.visit::<ORDERED>(&space.localize(ray), tmax, |hit| {
-                        tmax = met(&Meeting::with_triangle(&hit.of(*instance), Some(space)));
+                    Item::Mesh { .. } if !built_in::INSTANCES => {}
+                    Item::Mesh { instance, set, space } => {
+                        let set = &self.scene.shared[*set as usize];
+                        set.visit::<ORDERED>(&space.localize(ray), tmax, |hit| {
+                            tmax = met(&Meeting::with_triangle(&hit.of(*instance), Some(space)));
+                            tmax
+                        });
+                    }
+                    Item::Flattened { set } => set.visit::<ORDERED>(ray, tmax, |hit| {
+                        tmax = met(&Meeting::with_triangle(hit, None));
                         tmax
-                    });
+                    }),
                 }
-                Item::Flattened { set } => set.visit::<ORDERED>(ray, tmax, |hit| {
-                    tmax = met(&Meeting::with_triangle(hit, None));
-                    tmax
-                }),
+                search_limit(tmax)
+            });
+            if tmax < 0.0 {
+                return;
             }
-            search_limit(tmax)
-        });
+        }
     }
 
     #[inline]
     fn prim(&self, meeting: &Meeting) -> &Prim {
         match &meeting.on {
-            On::Triangle { id, .. } => &self.instances[id.instance as usize],
-            On::Sphere(sphere) => &self.lights[sphere.light as usize],
+            On::Triangle { id, .. } => &self.prims.instances[id.instance as usize],
+            On::Sphere(sphere) => &self.prims.lights[sphere.light as usize],
         }
     }
 }
@@ -280,41 +250,4 @@ fn counts(
 fn usable(origin: DVec3, direction: DVec3) -> Option<Ray> {
     let sound = origin.is_finite() && direction.is_finite() && direction.as_vec3() != Vec3::ZERO;
     sound.then_some(Ray { origin, direction })
-}
-
-/// The sphere lights that have a surface.
-fn spheres(scene: &Scene, pose: &Pose) -> impl Iterator<Item = Sphere> {
-    scene.lights.iter().enumerate().filter_map(|(number, light)| {
-        let LightKind::Sphere { radius, .. } = light.kind else { return None };
-        let world = world_of(pose, light.node);
-        let radius_m = f64::from(pose.world_radius(light.node, radius));
-        let center = world.translation;
-        (radius_m > 0.0).then_some(Sphere { light: number as u32, center, radius_m })
-    })
-}
-
-/// A box around a transformed box.
-fn transform_box(bounds: &Aabb, to_world: &DAffine3) -> Aabb {
-    let corner = |i: usize| {
-        let side = |axis: usize| if i >> axis & 1 == 0 { bounds.min } else { bounds.max };
-        let pick = |axis: usize| f64::from(side(axis)[axis]);
-        to_world.transform_point3(DVec3::new(pick(0), pick(1), pick(2)))
-    };
-    let all = (1..8).map(corner);
-    let (low, high) = all.fold((corner(0), corner(0)), |(l, h), p| (l.min(p), h.max(p)));
-    outward(low, high)
-}
-
-/// Whether a box is small enough to build a tree over.
-fn is_sound(bounds: &Aabb) -> bool {
-    let small = |p: Vec3| p.abs().cmple(Vec3::splat(LARGEST_COORDINATE)).all();
-    small(bounds.min) && small(bounds.max)
-}
-
-/// Rounded so that nothing is lost; a local ray, rounded in its own space, still finds it.
-fn outward(low: DVec3, high: DVec3) -> Aabb {
-    let margin = (high - low).max_element() * f64::from(f32::EPSILON);
-    let low = (low - margin).as_vec3().to_array().map(f32::next_down);
-    let high = (high + margin).as_vec3().to_array().map(f32::next_up);
-    Aabb { min: low.into(), max: high.into() }
 }
