@@ -187,7 +187,7 @@ class LightCarriers:
             rgb = self._first(rgb)
         if light.material_sync == GLOW:
             mesh.report_still_glow(self.report)
-        lit = mesh.lit_primitives(self.materials, light, rgb)
+        lit = mesh.lit_primitives(self.materials, light, Emission(self._first(rgb), varies=rgb.ndim == 2))
         if rgb.ndim == 2 and lit:
             grown = keys_of_growth(self.frames, light.normalize, world, mesh.area, rgb)
             glow = np.array(mesh.pieces_lit(light.material_sync)[0].glow)

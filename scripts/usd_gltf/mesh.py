@@ -112,15 +112,14 @@ class MeshSource:
             for piece in self.pieces
         ]
 
-    def lit_primitives(self, materials: Materials, light: Light, rgb: np.ndarray) -> list[dict]:
-        """glTF primitives of a mesh light that emits `rgb` nits (times the material's glow)."""
-        first = rgb[0] if rgb.ndim == 2 else rgb
+    def lit_primitives(self, materials: Materials, light: Light, emitted: Emission) -> list[dict]:
+        """glTF primitives of a mesh light that emits so much (times the material's glow)."""
         primitives = []
         for piece, glow in zip(self.pieces, self.pieces_lit(light.material_sync), strict=True):
             if not any(glow.glow):
                 why = f"{piece.look.path} does not glow, and materialGlowTintsLight multiplies by its glow"
                 materials.report.about("lights").warn(light.path, "mesh light emits nothing", why)
-            emission = Emission(first * np.array(glow.glow), glow.texture, rgb.ndim == 2)
+            emission = Emission(emitted.rgb * np.array(glow.glow), glow.texture, emitted.varies)
             if light.material_sync == "noMaterialResponse":
                 index = materials.light_material(emission, piece.double_sided)
             else:

@@ -13,7 +13,7 @@ import math
 from dataclasses import dataclass, field
 
 import numpy as np
-from pxr import Usd, UsdGeom, UsdLux, UsdShade
+from pxr import Gf, Usd, UsdGeom, UsdLux, UsdShade
 
 from . import gprims
 from .cameras import read_camera
@@ -229,32 +229,44 @@ class PrimTree:
 
 
 def _over_time(xformable: UsdGeom.Xformable, frames: Frames) -> np.ndarray:
-    """Local matrices (times, 4, 4).
+    """Local matrices (times, 4, 4)."""
+    ops = xformable.GetOrderedXformOps()
+    if frames.is_number.all() or not any(_is_sampled_matrix(op) for op in ops):
+        return np.array([column(xformable.GetLocalTransformation(code)) for code in frames.codes])
+    return functools.reduce(np.matmul, [_op_over_time(op, frames) for op in ops])
+
+
+def _is_sampled_matrix(op: UsdGeom.XformOp) -> bool:
+    return op.GetOpType() == UsdGeom.XformOp.TypeTransform and op.MightBeTimeVarying()
+
+
+def _op_over_time(op: UsdGeom.XformOp, frames: Frames) -> np.ndarray:
+    """Matrices (times, 4, 4) of one op.
 
     USD interpolates a sampled matrix by its numbers, which shrinks what turns. So time codes that are no frames lie
-    between their neighbours among frames and authored samples, as `between` goes.
+    between their neighbours among frames and authored samples, as `between` goes. Where USD holds the matrix
+    (all over a stage of held interpolation; before a sample that is a value block), it is held.
     """
-
-    @functools.cache
-    def at(code: float) -> np.ndarray:
-        return column(xformable.GetLocalTransformation(code))
-
-    ops = xformable.GetOrderedXformOps()
-    if frames.is_number.all() or not any(op.GetOpType() == UsdGeom.XformOp.TypeTransform and op.MightBeTimeVarying() for op in ops):
-        return np.array([at(code) for code in frames.codes])
-    samples = xformable.GetTimeSamples()
-    low, high = [], []
-    for code, is_number in zip(frames.codes, frames.is_number, strict=True):
-        whole = code if is_number else frames.first + math.floor(code - frames.first)
+    found = np.array([column(op.GetOpTransform(code)) for code in frames.codes])
+    if not _is_sampled_matrix(op):
+        return found
+    at, samples = UsdGeom.XformOp(op.GetAttr()).GetOpTransform, op.GetTimeSamples()
+    rows, share, starts, ends = [], [], [], []
+    for row in np.flatnonzero(~frames.is_number):
+        code = frames.codes[row]
+        whole = frames.first + math.floor(code - frames.first)
         upto, since = bisect.bisect_right(samples, code), bisect.bisect_left(samples, code)
-        low.append(max([whole, *samples[max(upto - 1, 0) : upto]]))
-        high.append(min([code if is_number else whole + 1, *samples[since : since + 1]]))
-    low, high = np.array(low), np.array(high)
-    span = high - low
-    share = np.where(span > 0, (np.array(frames.codes) - low) / np.where(span > 0, span, 1.0), 0.0)
-    found, end = np.array([at(code) for code in low]), np.array([at(code) for code in high])
-    inside = share > 0
-    found[inside] = between(found[inside], end[inside], share[inside])
+        low = max([whole, *samples[max(upto - 1, 0) : upto]])
+        high = min([whole + 1, *samples[since : since + 1]])
+        start = at(low)
+        if at(code) != start:
+            rows.append(row)
+            share.append((code - low) / (high - low))
+            starts.append(column(start))
+            ends.append(column(at(high)))
+    if rows:
+        means = between(np.array(starts), np.array(ends), np.array(share))
+        found[rows] = [column(Gf.Matrix4d(mean.T).GetInverse()) for mean in means] if op.IsInverseOp() else means
     return found
 
 

@@ -27,12 +27,16 @@ def moving(ops: str, order: str, name="M", kind="Cube") -> str:
     return f'def {kind} "{name}" {{ {ops}\n uniform token[] xformOpOrder = [{order}] }}\n'
 
 
-def turned(degrees: float, x: float) -> str:
-    """A matrix that turns about (1, 1, 1) and moves, as usda spells it."""
+def turn(degrees: float, x: float) -> np.ndarray:
+    """A matrix that turns about (1, 1, 1) and moves."""
     c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
     a, b = (1 - c) / 3, s / np.sqrt(3)
-    rows = np.array([[c + a, a - b, a + b, x], [a + b, c + a, a - b, 0], [a - b, a + b, c + a, 0], [0, 0, 0, 1]]).T
-    return str(tuple(tuple(map(float, row)) for row in rows))
+    return np.array([[c + a, a - b, a + b, x], [a + b, c + a, a - b, 0], [a - b, a + b, c + a, 0], [0, 0, 0, 1]])
+
+
+def turned(degrees: float, x: float) -> str:
+    """The same as usda spells it."""
+    return str(tuple(tuple(map(float, row)) for row in turn(degrees, x).T))
 
 
 MOTIONS = {
@@ -84,8 +88,9 @@ def at(gltf: Gltf, path: str, frame: float) -> np.ndarray:
     return matrix
 
 
-def in_usd(text: str, path: str, frame: float) -> np.ndarray:
+def in_usd(text: str, path: str, frame: float, interpolation=Usd.InterpolationTypeLinear) -> np.ndarray:
     stage = Usd.Stage.CreateInMemory()
+    stage.SetInterpolationType(interpolation)
     stage.GetRootLayer().ImportFromString(text.replace("}", "\n}"))
     return np.array(UsdGeom.XformCache(frame).GetLocalToWorldTransform(stage.GetPrimAtPath(path))).T
 
@@ -205,6 +210,102 @@ def test_sampled_matrices_between_frames_are_kept(gltf):
         assert at(scene, "/M", code) == pytest.approx(in_usd(text, "/M", code), abs=1e-5)
 
 
+def matrices(samples: dict[float, float | None]) -> str:
+    """A sampled matrix op that turns and moves by these; None is a value block."""
+    spelled = ", ".join(f"{code}: {x if x is None else turned(10 * x, x)}" for code, x in samples.items())
+    return f"matrix4d xformOp:transform.timeSamples = {{ {spelled} }}\n"
+
+
+JUMPS = {
+    "translate": ("double3 xformOp:translate.timeSamples = { 1: (0, 0, 0), 2: (8, 0, 0) }", '"xformOp:translate"'),
+    "transform": (matrices({1: 0, 2: 8}), '"xformOp:transform"'),
+    "transform between frames": (matrices({0.5: 3, 1: 0, 1.75: 4, 2: 8, 3.6: 1}), '"xformOp:transform"'),
+    "two ops": (
+        matrices({1: 0, 2: 8}) + "float xformOp:rotateY.timeSamples = { 1: 0, 3: 50 }",
+        '"xformOp:transform", "xformOp:rotateY", "!invert!xformOp:transform"',
+    ),
+}
+"""What jumps in a stage of held interpolation, which is no part of a file."""
+HOLDS = {
+    "a matrix before a value block": (matrices({1: 4, 2: None, 3: 8}), '"xformOp:transform"'),
+    "a matrix before a value block, and its inverse": (
+        matrices({1: 4, 2: None, 3: 8}) + "double3 xformOp:translate = (1, 2, 3)",
+        '"xformOp:transform", "xformOp:translate", "!invert!xformOp:transform"',
+    ),
+    "a held matrix beside what goes on": (
+        matrices({1: 4, 2: None, 3: 8}) + "double3 xformOp:translate.timeSamples = { 1: (0, 0, 0), 4: (6, 0, 0) }",
+        '"xformOp:translate", "xformOp:transform"',
+    ),
+    "a held spline beside a matrix that stands in between": (
+        matrices({0: 0, 3: 0, 4: 8}) + "double xformOp:translateX.spline = {\n 1: 0; post held,\n 2: 8; post held,\n}",
+        '"xformOp:translateX", "xformOp:transform"',
+    ),
+}
+"""What stays where it is in a stage of any interpolation, from the first frame at least until the second."""
+
+
+@pytest.fixture
+def held_stages(monkeypatch):
+    """Stages are opened with held interpolation."""
+    from usd_gltf import export as module
+
+    def open_held(*arguments):
+        stage = module.open_stage.opened(*arguments)
+        stage.SetInterpolationType(Usd.InterpolationTypeHeld)
+        return stage
+
+    open_held.opened = module.open_stage
+    monkeypatch.setattr(module, "open_stage", open_held)
+
+
+@pytest.mark.parametrize("jump", JUMPS)
+def test_what_is_held_is_not_blurred_while_a_shutter_is_open_after_the_frame(gltf, held_stages, jump):
+    """It jumps while the shutter is closed: keys are linear, and the ramp of the jump is from closing to the next frame."""
+    text = HEADER + camera(0, 0.5) + moving(*JUMPS[jump])
+    scene = gltf(text)
+    for code in np.add.outer([1, 2, 3, 4], [0, 0.125, 0.25, 0.375, 0.5]).ravel():
+        expected = in_usd(text, "/M", code, Usd.InterpolationTypeHeld)
+        assert at(scene, "/M", code) == pytest.approx(expected, abs=2e-5), code
+
+
+@pytest.mark.parametrize("opening", SHUTTERS)
+@pytest.mark.parametrize("jump", JUMPS)
+def test_what_is_held_is_where_usd_has_it_when_shutters_open_and_close(gltf, held_stages, jump, opening):
+    text = HEADER + camera(*opening) + moving(*JUMPS[jump])
+    scene = gltf(text)
+    for frame in (1, 2, 4):
+        for code in (frame, *(frame + end for end in opening)):
+            expected = in_usd(text, "/M", code, Usd.InterpolationTypeHeld)
+            assert at(scene, "/M", code) == pytest.approx(expected, abs=2e-5), code
+
+
+@pytest.mark.parametrize("hold", HOLDS)
+def test_sampled_matrices_that_usd_holds_are_held(gltf, hold):
+    text = HEADER + camera(0, 0.5) + moving(*HOLDS[hold])
+    scene = gltf(text)
+    for code in np.add.outer([1, 2, 3], [0, 0.25, 0.5]).ravel()[:-2]:
+        assert at(scene, "/M", code) == pytest.approx(in_usd(text, "/M", code), abs=2e-5), code
+
+
+def test_ops_beside_a_sampled_matrix_go_as_usd_has_them(gltf):
+    """A lamp that spins a turn and more each frame on an arm that is sampled as matrices."""
+    ops = matrices({code: 2 * code for code in range(0, 6)}) + "float xformOp:rotateZ.timeSamples = { 0: 0, 5: 2500 }"
+    scene = gltf(HEADER + camera() + moving(ops, '"xformOp:transform", "xformOp:rotateZ"'))
+    for code in np.add.outer([1, 2, 3, 4], [-0.25, 0, 0.25]).ravel():
+        angle, spin = np.radians(500 * code), np.eye(4)
+        spin[:2, :2] = [[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]
+        assert at(scene, "/M", code) == pytest.approx(turn(20 * code, 2 * code) @ spin, abs=2e-5), code
+
+
+def test_a_sampled_pivot_and_its_inverse_go_together(gltf):
+    ops = matrices({code: 2 * code for code in range(0, 6)}) + "float xformOp:rotateZ = 90"
+    scene = gltf(HEADER + camera() + moving(ops, '"xformOp:transform", "xformOp:rotateZ", "!invert!xformOp:transform"'))
+    quarter = np.array([[0, -1, 0, 0], [1, 0, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]])
+    for code in np.add.outer([1, 2, 3, 4], [-0.25, 0, 0.25]).ravel():
+        pivot = turn(20 * code, 2 * code)
+        assert at(scene, "/M", code) == pytest.approx(pivot @ quarter @ np.linalg.inv(pivot), abs=2e-5), code
+
+
 def test_instances_move_within_the_shutter(gltf):
     text = """def PointInstancer "I" {
         rel prototypes = [</I/P>]
@@ -244,6 +345,47 @@ def test_light_changes_within_the_shutter(gltf):
     assert frames == pytest.approx([0.75, 1, 2, 2.25, 2.75, 3, 4])
     assert np.array(values["rgb"])[:, 0] == pytest.approx([1, 2, 4, 40, 3 + 37 / 3, 3, 3], rel=1e-6)
     assert scene.nits("/L") == pytest.approx([2] * 3), "the material has the first frame's"
+
+
+LIT = {
+    "RectLight": 'def RectLight "L" {',
+    "SphereLight": 'def SphereLight "L" {',
+    "point": 'def SphereLight "L" { bool treatAsPoint = 1\n bool inputs:normalize = 1',
+    "spot": 'def SphereLight "L" (prepend apiSchemas = ["ShapingAPI"]) { float inputs:radius = 0\n float inputs:shaping:cone:angle = 30',
+    "DistantLight": 'def DistantLight "L" {',
+    "DomeLight": 'def DomeLight "L" {',
+    "mesh light": 'def Cube "L" (prepend apiSchemas = ["MeshLightAPI"]) { uniform token light:materialSyncMode = "noMaterialResponse"',
+    "mesh light of a material": """
+        def Material "Mat" {
+            token outputs:surface.connect = </Mat/S.outputs:surface>
+            def Shader "S" {
+                uniform token info:id = "UsdPreviewSurface"
+                color3f inputs:emissiveColor = (1, 1, 1)
+                token outputs:surface
+            }
+        }
+        def Cube "L" (prepend apiSchemas = ["MeshLightAPI", "MaterialBindingAPI"]) {
+            uniform token light:materialSyncMode = "materialGlowTintsLight"
+            rel material:binding = </Mat>""",
+}
+
+
+def at_rest(scene: Gltf) -> float:
+    """The strength of the light, whatever carries it, that a reader without `values` sees."""
+    lux = scene.lux("/L")
+    if lux["type"] == "DomeLight":
+        return lux["radiance"][0]
+    return scene.nits("/L")[0] if "mesh" in scene.node("/L") else scene.light("/L")["intensity"]
+
+
+@pytest.mark.parametrize("light", LIT)
+@pytest.mark.parametrize("opening", SHUTTERS)
+def test_a_light_at_rest_is_the_first_frames(gltf, light, opening):
+    """Not that of when the first shutter opens, before it."""
+    keys = "float inputs:intensity.timeSamples = { 0.9: 0, 1: 100, 1.1: 7, 4: 20 }"
+    moving, still = (gltf(f"{HEADER} {camera(*opening)} {LIT[light]}\n {lines} }}") for lines in (keys, "float inputs:intensity = 100"))
+    assert at_rest(still) > 0
+    assert at_rest(moving) == pytest.approx(at_rest(still), rel=1e-6)
 
 
 def test_a_glow_changes_within_the_shutter(gltf):
