@@ -7,6 +7,7 @@
 //! | module | question |
 //! |---|---|
 //! | [`delegate`] | what is done once for a shot, and what for each frame? |
+//! | `frame_times` | when does the camera see a frame? |
 //! | [`path`], `walk` | how does light get from a lamp to the eye, and where are its vertices? |
 //! | [`direct`], [`fog`] | what do picked lights give a surface, what a stretch of fog? |
 //! | [`links`] | which lights light a surface, and what casts their shadows? |

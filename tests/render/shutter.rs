@@ -169,7 +169,7 @@ fn where_nothing_moves_a_shutter_changes_nothing() {
 
 /// The strengths of the panel and of the bulb of a still room, step by step.
 fn lit(values: [f32; 2]) -> Option<Keys<Vec3>> {
-    let values = values.map(|value| Vec3::splat(value)).into();
+    let values = values.map(Vec3::splat).into();
     Some(Keys { times_s: vec![0.0, 0.5], values, interpolation: Interpolation::Step })
 }
 
@@ -212,11 +212,9 @@ fn a_shutter_may_be_open_away_from_its_frame() {
     let mut stage = Stage::default();
     stage.quad([8.0, 8.0], glow(Vec3::ONE), Trs::default());
     stage.look(DVec3::Z * 3.0, DVec3::ZERO, 1.0);
-    let step = |from, to| {
-        let (times_s, values) = (vec![0.0, 0.5 / 24.0], vec![from, to]);
-        vec![Channel::Translation(Keys { times_s, values, interpolation: Interpolation::Step })]
-    };
-    stage.scene.nodes[0].channels = step(Vec3::ZERO, Vec3::X * 100.0);
+    let (times_s, values) = (vec![0.0, 0.5 / 24.0], vec![Vec3::ZERO, Vec3::X * 100.0]);
+    let step = Keys { times_s, values, interpolation: Interpolation::Step };
+    stage.scene.nodes[0].channels = vec![Channel::Translation(step)];
     let settings = RenderSettings { depth: 0, ..direct(8, 4) };
     for (shutter, seen) in [((0.0, 0.4), 1.0), ((0.6, 0.9), 0.0), ((-0.4, 0.0), 1.0)] {
         stage.scene.cameras[0].shutter = Shutter::new(shutter.0, shutter.1);
