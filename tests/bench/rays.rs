@@ -55,6 +55,7 @@ fn main() {
             *radius = 0.0;
         }
     }
+    let prepared = RayScene::new(&scene, &pose);
     let tracer = prepared.for_pose(&scene, &pose);
     let kinds = [("primary", &primary), ("diffuse", &diffuse), ("shadow", &shadow)];
     for (name, rays) in kinds {
