@@ -57,9 +57,11 @@ proptest! {
         }
     }
 
-    /// Frames have the same digest if and only if they have the same fingerprint; then they share a tree.
+    /// Frames of one fingerprint share a tree, and so have one digest. Frames of one digest have one fingerprint,
+    /// unless a forced light varies: it is sampled at every point, however strong it is.
     #[test]
     fn frames_that_are_alike_share_a_tree(prims in prop::collection::vec(prim(), 0..60)) {
+        let may_differ_unseen = prims.iter().any(|prim| prim.forced && prim.varies);
         let scene = scene_of(&without_twins(prims));
         let tree = whole(&scene);
         if tree.frames().is_empty() {
@@ -69,7 +71,8 @@ proptest! {
         for a in 0..FRAMES.len() {
             for b in 0..a {
                 let alike = prints[a] == prints[b];
-                prop_assert_eq!(told[a] == told[b], alike);
+                prop_assert!(!alike || told[a] == told[b]);
+                prop_assert!(alike || told[a] != told[b] || may_differ_unseen);
                 prop_assert!(!alike || rows[a].tree == rows[b].tree);
             }
         }
