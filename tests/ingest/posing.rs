@@ -78,7 +78,9 @@ pub fn places(scene: &Scene, instance: usize, time_s: f64) -> Vec<Vec3> {
     let instance = &scene.instances[instance];
     let world = scene.pose_at(time_s).world(instance.node);
     let positions = &scene.meshes[instance.mesh as usize].positions;
-    positions.iter().map(|&place| world.transform_point3(place)).collect()
+    let in_world =
+        |&place: &Vec3| (scene.origin + world.transform_point3(place).as_dvec3()).as_vec3();
+    positions.iter().map(in_world).collect()
 }
 
 pub fn assert_near(found: &[Vec3], expected: &[Vec3]) {
