@@ -206,11 +206,14 @@ impl<'a> RenderDelegate<'a> {
         let links = self.links.as_ref().map(|shot| FrameLinks { shot, infinite: &infinite });
         let picker = LightPicker::new(settings, tree, &infinite).linked(links);
         let tracers = self.geometry.for_poses(scene, times.poses());
+        let fog = times.poses().par_iter().map(|pose| Fog::new(scene, pose, &self.camera));
+        let fog: Vec<Option<Fog>> = fog.collect();
         let integrator = |(view, camera): (usize, &CameraRays)| {
-            let pose = &times.poses()[times.pose_of(view)];
+            let at = times.pose_of(view);
+            let pose = &times.poses()[at];
             Integrator {
                 settings,
-                tracer: &tracers[times.pose_of(view)],
+                tracer: &tracers[at],
                 surfaces: Surfaces::new(scene, pose),
                 emitters: at_pose(pose),
                 infinite: &infinite,
@@ -218,7 +221,7 @@ impl<'a> RenderDelegate<'a> {
                 links,
                 camera: *camera,
                 cells: learned.map(|learned| learned.cells),
-                fog: Fog::new(scene, pose, &self.camera),
+                fog: fog[at].clone(),
                 groups: self.plan.as_ref().ok().and_then(|plan| plan.groups.as_ref()),
                 found_by_reflection: match settings.mis {
                     true if infinite.iter().any(InfiniteLight::meets_reflections) => {

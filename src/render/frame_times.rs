@@ -24,14 +24,14 @@ impl FrameTimes {
     /// A frame while the camera's shutter is open, or at its instant if there is none. What does not change in that time
     /// is posed once.
     pub fn of_shutter(scene: &Scene, camera: &Camera, frame: i32, size: [u32; 2]) -> FrameTimes {
-        if camera.shutter.is_none() {
+        let Some(shutter) = camera.shutter else {
             return FrameTimes::instant(scene, camera, frame.into(), size);
-        }
+        };
         let times = scene.times_of(camera, frame);
         let mut posing = Posing::new(scene);
         let first = posing.at_frame(times[0]).clone();
         let is_still = times.iter().all(|&time| scene.is_alike(&first, posing.at_frame(time)));
-        let times = if is_still { scene.times_of_view(camera, frame) } else { times };
+        let times = if is_still { shutter.times_of_view(frame) } else { times };
         let time = times[times.len() / 2];
         if !is_still {
             let poses: Vec<Pose> = times.iter().map(|&at| posing.at_frame(at).clone()).collect();
