@@ -14,10 +14,11 @@ echo "== lints"
 cargo clippy --quiet --all-targets -- -D warnings
 echo "== documentation"
 RUSTDOCFLAGS="-D warnings" cargo doc --quiet --no-deps --document-private-items
+# Before the Rust tests: one of them exports a stage.
+environment scripts/requirements.txt scripts/requirements-test.txt
 echo "== tests"
 cargo test --quiet
 echo "== exporter"
-environment scripts/requirements.txt scripts/requirements-test.txt
 "$python" -m pytest --quiet tests/exporter
 echo "== farms"
 # RQD's own dependences are for desktops.

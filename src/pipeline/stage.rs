@@ -116,6 +116,14 @@ pub enum StageError {
         /// Why.
         cause: io::Error,
     },
+    /// The stage is not there, or is no file.
+    #[error("{}: cannot be read: {cause}; check the path", scene.display())]
+    NoScene {
+        /// The stage.
+        scene: PathBuf,
+        /// Why.
+        cause: io::Error,
+    },
     /// There is no room for the export.
     #[error("{}: cannot be exported to a temporary folder: {cause}; set TMPDIR to a folder with room", scene.display())]
     NoFolder {
@@ -161,6 +169,8 @@ impl ExportedStage {
         strict: Option<&Strict>,
         watch: &dyn Watch,
     ) -> Result<ExportedStage, StageError> {
+        let no_scene = |cause| StageError::NoScene { scene: source.into(), cause };
+        std::fs::File::open(source).map_err(no_scene)?;
         let exporter = exporter(source)?;
         let no_folder = |cause| StageError::NoFolder { scene: source.into(), cause };
         let folder = tempfile::Builder::new().prefix("candelabra-").tempdir().map_err(no_folder)?;
@@ -248,11 +258,14 @@ fn listen(mut child: Child, source: &Path, watch: &dyn Watch) -> Result<(), Stag
     // Its report goes with the folder; the lines of it have been told.
     let said = rest.join("\n");
     let said = said.split(" (see ").next().unwrap_or_default();
+    let is_usage = code == Some(USAGE);
+    let name = source.file_name().unwrap_or_default().to_string_lossy();
     let said = match said.strip_prefix("error: ").unwrap_or(said).trim() {
         "" => format!("{}: the exporter ended with {ended:?}, and said nothing", source.display()),
-        said => said.to_owned(),
+        said if is_usage || said.contains(&*name) => said.to_owned(),
+        said => format!("{}: {said}", source.display()),
     };
-    Err(StageError::Refused { said, is_usage: code == Some(USAGE) })
+    Err(StageError::Refused { said, is_usage })
 }
 
 /// What a pipe has to say, line by line.

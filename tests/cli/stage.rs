@@ -192,6 +192,11 @@ fn errors_of_the_exporter_are_passed_on() {
             1,
             "nothing was written\n",
         ),
+        (
+            "echo 'error: python3 lacks the package pxr' >&2; exit 1",
+            1,
+            "candelabra-render: scene.usda: python3 lacks the package pxr",
+        ),
         ("exit 7", 1, "said nothing"),
         ("kill -9 $$", 1, "said nothing"),
         ("exit 0", 1, "scene.glb"),
@@ -219,6 +224,16 @@ fn a_missing_python_or_exporter_is_named_with_the_remedy() {
         assert!(ended.err.contains(words), "{}", ended.err);
     }
     assert!(stage.left().is_empty() && stage.left_no_trace());
+}
+
+/// It is told before any Python is looked for.
+#[test]
+fn a_stage_that_is_not_there_is_named() {
+    let stage = Stage::with("echo 'error: python3 lacks the package pxr' >&2; exit 1");
+    let ended = end(&mut stage.command(RENDER, &format!("gone.usda -o a.exr {QUICK}")));
+    assert_eq!(ended.code, Some(1), "{}", ended.err);
+    assert!(ended.err.contains("gone.usda: cannot be read"), "{}", ended.err);
+    assert!(!ended.err.contains("pxr"), "{}", ended.err);
 }
 
 #[test]
