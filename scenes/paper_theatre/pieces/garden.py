@@ -143,10 +143,10 @@ def strings(layer):
         ):
             a, b = ((side * x, y, z) for x, y, z in (start, stop))
             spots += resample(hanging(a, b, sag, 16), 19)[1:]
-        for x, y, tall in ((560, 190, 1.0), (695, 50, 0.81)):
+        for x, y, tall in ((560, 170 if side < 0 else 210, 1.0), (695, 50, 0.81)):
             for k in range(120):
                 u = 0.04 + 0.94 * k / 120
-                radius = 56 * math.sin(math.pi * min(0.06 + 0.94 * u, 1)) ** 0.75 * (1 - 0.55 * u) + 3
+                radius = 66 * math.sin(math.pi * min(0.06 + 0.94 * u, 1)) ** 0.75 * (1 - 0.55 * u) + 3
                 t = 2.39996 * k
-                spots.append((side * x + radius * math.cos(t), y + radius * math.sin(t), tall * (20 + 560 * u)))
+                spots.append((side * x + radius * math.cos(t), y - 14 + radius * math.sin(t), tall * (20 + 560 * u)))
     bulbs(layer, "Strings", ["Fairy"], [(0, p) for p in spots])

@@ -6,13 +6,12 @@ from parts.usda import Layer, num, vec
 
 # name: (diffuse colour, roughness, metallic)
 PLAIN = {
-    "Lawn": ((0.035, 0.06, 0.02), 0.9, 0),
-    "Gravel": ((0.20, 0.18, 0.15), 0.9, 0),
-    "Hedge": ((0.02, 0.045, 0.02), 0.8, 0),
+    "Lawn": ((0.06, 0.10, 0.035), 0.9, 0),
+    "Gravel": ((0.26, 0.22, 0.18), 0.9, 0),
+    "Hedge": ((0.03, 0.07, 0.03), 0.8, 0),
     "Cypress": ((0.018, 0.04, 0.02), 0.8, 0),
     "Black": ((0.015, 0.015, 0.017), 0.6, 0),
     "Iron": ((0.05, 0.05, 0.055), 0.4, 1),
-    "Tin": ((0.6, 0.56, 0.5), 0.3, 1),
     "Bench": ((0.10, 0.06, 0.035), 0.6, 0),
     "CoatA": ((0.05, 0.05, 0.07), 0.9, 0),
     "CoatB": ((0.16, 0.05, 0.04), 0.9, 0),
@@ -28,7 +27,7 @@ PLAIN = {
     "Drum": ((0.55, 0.10, 0.04), 0.5, 0),
     "Flame": ((0.62, 0.06, 0.02), 0.5, 0),
     "CardGold": ((0.72, 0.42, 0.10), 0.35, 0),
-    "Blue": ((0.02, 0.045, 0.10), 0.6, 0),
+    "Blue": ((0.03, 0.075, 0.17), 0.6, 0),
 }
 # What glows by its material alone, in nits.
 GLOWS = {"Eye": (60, 44, 14), "Tube": (1, 1, 1)}
@@ -63,8 +62,8 @@ def write(folder):
             dark = "color3f inputs:diffuseColor = (0, 0, 0)"
             material(layer, name, [dark, f"color3f inputs:emissiveColor = {vec(color)}"])
         paint = ["color3f inputs:diffuseColor = (0.55, 0.06, 0.02)", "float inputs:roughness = 0.35"]
-        material(layer, "HeadPaper", [*paint, "color3f inputs:emissiveColor = (5, 0.62, 0.16)"])
-        coat = ["float inputs:clearcoat = 1", "float inputs:clearcoatRoughness = 0.05"]
+        material(layer, "HeadPaper", [*paint, "color3f inputs:emissiveColor = (4, 0.4, 0.08)"])
+        coat = ["float inputs:clearcoat = 1", "float inputs:clearcoatRoughness = 0.16"]
         red = "color3f inputs:diffuseColor = (0.24, 0.018, 0.015)"
         material(layer, "Lacquer", [red, "float inputs:roughness = 0.6", *coat])
         # Oiled paper, lit from inside: what it lets through is a texture, in nits.
@@ -73,8 +72,8 @@ def write(folder):
             "Scales",
             ["float inputs:roughness = 0.6"],
             {
-                "diffuseColor": ("scales.png", "rgb", [SRGB, "float4 inputs:scale = (0.5, 0.5, 0.5, 1)"]),
-                "emissiveColor": ("scales.png", "rgb", [SRGB, "float4 inputs:scale = (13, 13, 13, 1)"]),
+                "diffuseColor": ("scales.png", "rgb", [SRGB, "float4 inputs:scale = (0.5, 0.25, 0.2, 1)"]),
+                "emissiveColor": ("scales.png", "rgb", [SRGB, "float4 inputs:scale = (15, 13, 13, 1)"]),
             },
         )
         surface(
@@ -87,7 +86,7 @@ def write(folder):
                 "float inputs:specular_roughness = 0.45",
                 "float inputs:coat_weight = 0.8",
                 "float inputs:coat_ior = 1.5",
-                "float inputs:coat_roughness = 0.12",
+                "float inputs:coat_roughness = 0.2",
             ],
             [
                 ("Tinted", "ND_multiply_color3", ["color3f inputs:in1 = @Wood", "color3f inputs:in2 = (0.9, 0.8, 0.75)"]),
@@ -107,9 +106,9 @@ def write(folder):
             ],
         )
         metal = ["float inputs:base = 1", "float inputs:metalness = 1"]
-        gold = [*metal, "color3f inputs:base_color = (0.86, 0.56, 0.2)", "float inputs:specular_roughness = 0.32"]
+        gold = [*metal, "color3f inputs:base_color = (0.86, 0.56, 0.2)", "float inputs:specular_roughness = 0.42"]
         surface(layer, "Gilt", "arnold", "arnold:standard_surface", gold)
-        cloth = ["color3f inputs:base_color = (0.40, 0.016, 0.022)", "float inputs:base = 1"]
+        cloth = ["color3f inputs:base_color = (0.27, 0.011, 0.016)", "float inputs:base = 1"]
         cloth += ["float inputs:specular = 0.3", "float inputs:specular_roughness = 0.7"]
         surface(layer, "Velvet", "arnold", "arnold:standard_surface", cloth)
     layer.save(folder)

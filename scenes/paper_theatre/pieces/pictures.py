@@ -21,7 +21,7 @@ def boards(size=96, planks=6):
 
 
 def scales(size=64, rows=4):
-    """Overlapping scales of oiled paper that is lit from inside: what they let through. u runs about the body; v along it."""
+    """Overlapping scales of oiled paper, lit from the middle of each drum: what they let through. u runs about the body, v along it."""
     y, x = np.mgrid[0:size, 0:size] / size
     best = np.full((size, size), -1.0)
     edge = np.zeros((size, size))
@@ -33,10 +33,11 @@ def scales(size=64, rows=4):
             best = np.where(inside, row, best)
             edge = np.where(inside, r / 0.5, edge)
     belly = np.exp(-(((np.abs(x - 0.5) - 0.5) / 0.16) ** 2))[..., None]
-    paper = mixed((1.0, 0.16, 0.035), (0.62, 0.035, 0.012), edge**2)
+    paper = mixed((1.0, 0.10, 0.02), (0.5, 0.022, 0.008), edge**2)
     rim = np.clip((edge - 0.78) * 9, 0, 1) * np.clip((1.0 - edge) * 12, 0, 1)
-    paper = mixed(paper, (1.0, 0.55, 0.12), rim)
-    return encode(np.clip(paper * (1 - belly) + np.array((1.0, 0.42, 0.10)) * belly, 0, 1))
+    paper = mixed(paper, (1.0, 0.42, 0.07), rim)
+    paper = paper * (1 - belly) + np.array((1.0, 0.36, 0.07)) * belly
+    return encode(np.clip(paper * (0.16 + 0.84 * np.sin(np.pi * y) ** 1.5)[..., None], 0, 1))
 
 
 def painted_sky(width=160, height=80):
@@ -64,7 +65,7 @@ def dusk(width=64, height=32):
     y, x = np.mgrid[0:height, 0:width]
     up = 1 - 2 * (y + 0.5) / height
     toward = 0.5 + 0.5 * np.cos(2 * np.pi * (x + 0.5) / width)
-    high = mixed((0.30, 0.42, 0.62), (0.06, 0.12, 0.30), np.clip(up, 0, 1) ** 0.6)
+    high = mixed((0.24, 0.40, 0.66), (0.045, 0.11, 0.32), np.clip(up, 0, 1) ** 0.6)
     glow = (np.exp(-np.clip(up, 0, 1) / 0.16) * toward**2)[..., None]
     sky = high * (0.55 + 0.45 * toward[..., None]) + glow * np.array((0.62, 0.30, 0.12))
     return encode(np.clip(np.where((up > 0)[..., None], sky, np.array((0.015, 0.02, 0.02))), 0, 1))

@@ -4,14 +4,14 @@ import math
 
 
 def spot(v, h):
-    """A theatre's profile spot: 9,000 candela, flat within 9 degrees, with a soft edge."""
-    return 9000 / (1 + math.exp((v - 10.5) / 0.9)) + 40 * math.cos(math.radians(v)) ** 2
+    """A theatre's profile spot: 5,000 candela, flat within 9 degrees, with a soft edge."""
+    return 5000 / (1 + math.exp((v - 10.5) / 0.9)) + 40 * math.cos(math.radians(v)) ** 2
 
 
 def washer(v, h):
     """Two lobes, as a wall washer's reflector throws them: up, and aside at 38 degrees, wider along h = 90."""
     aside = math.exp(-(((v - 38) / 13) ** 2)) * (0.25 + 0.75 * abs(math.sin(math.radians(h))))
-    return 60 * math.exp(-((v / 9) ** 2)) + 34 * aside
+    return 30 * math.exp(-((v / 9) ** 2)) + 20 * aside
 
 
 PROFILES = {"profile_spot": (spot, 1.5, (0,)), "wall_washer": (washer, 5.0, (0, 30, 60, 90))}

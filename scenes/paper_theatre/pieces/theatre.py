@@ -127,22 +127,23 @@ CREST = [(0, 0), (0.16, 0.05), (0.32, 0.2), (0.46, 0.5), (0.56, 0.84), (0.68, 1.
 def sea(layer):
     """Three rows of waves, which slide past one another. Each is a deep board with one that is a little higher behind it."""
     for name, y, level, wide, high, slide, start in (
-        ("Far", 395, 138, 118, 46, -9, 0),
-        ("Middle", 205, 118, 142, 56, 16, -40),
-        ("Near", 135, 100, 170, 50, -22, -85),
+        ("Far", 395, 138, 118, 46, -9, 4),
+        ("Middle", 205, 118, 142, 56, 16, -8),
+        ("Near", 135, 100, 170, 50, -22, 11),
     ):
         keys = f"{{ 1000: ({start}, 0, 0), 1025: ({start + slide}, 0, 0) }}"
         body = [f"double3 xformOp:translate.timeSamples = {keys}", 'uniform token[] xformOpOrder = ["xformOp:translate"]']
         mesh = Mesh()
         for scale, shift, material in ((1.0, 0, "Foam"), (0.9, -1.5, "SeaMid"), (0.72, -3, "SeaDeep")):
             line = []
-            for k in range(-5, 5):
+            count = int(400 / wide) + 1
+            for k in range(-count, count):
                 wave = [(wide * (k + u), level + shift * 2 + high * scale * v) for u, v in CREST]
                 line += wave
-            line = rounded([*line, (wide * 5, level + shift * 2)], 1)
-            outline = [(-wide * 5, FLOOR - 30), (wide * 5, FLOOR - 30), *line[::-1]]
-            front = y + shift
-            mesh.face([(x, front, max(z, FLOOR + 0.5)) for x, z in outline], material)
+            end = min(wide * count, 408 - abs(start) - abs(slide))
+            line = [(x, z) for x, z in rounded(line, 1) if abs(x) < end]
+            outline = [(-end, FLOOR + 0.5), (end, FLOOR + 0.5), (end, line[-1][1]), *line[::-1], (-end, line[0][1])]
+            mesh.face([(x, y + shift, z) for x, z in outline], material)
         with layer.prim("Xform", f"Sea{name}", body=body):
             mesh.write(layer, "Boards", body=["uniform bool doubleSided = 1"])
 
@@ -156,9 +157,9 @@ def sky(layer):
         ]):  # fmt: skip
             pass
         dice, stars = Dice(77), []
-        while len(stars) < 1100:
+        while len(stars) < 600:
             x, z = dice(-360, 360), dice(-20, 170)
-            if dice() < ((z + 20) / 190) ** 0.8:
+            if dice() < ((z + 20) / 190) ** 1.3:
                 stars.append((min(int(dice() ** 2 * 3), 2), (x, dice(-8, -3), z)))
         bulbs(layer, "Stars", ["StarBlue", "StarWhite", "StarGold"], stars)
 
@@ -177,11 +178,11 @@ def bulbs(layer, name, kinds, items):
 
 # name: (kelvin or colour, radius in cm, nits)
 BULBS = {
-    "StarBlue": ((0.55, 0.75, 1.0), 0.45, 330),
-    "StarWhite": ((1.0, 0.95, 0.85), 0.6, 420),
-    "StarGold": ((1.0, 0.72, 0.36), 0.8, 460),
-    "Marquee": (2400, 2.3, 170),
-    "Fairy": (2200, 1.5, 260),
+    "StarBlue": ((0.55, 0.75, 1.0), 0.8, 75),
+    "StarWhite": ((1.0, 0.95, 0.85), 1.0, 75),
+    "StarGold": ((1.0, 0.72, 0.36), 1.2, 80),
+    "Marquee": (2400, 2.6, 75),
+    "Fairy": (2200, 2.3, 110),
 }
 
 
@@ -196,13 +197,20 @@ def bulb_assets(folder):
                 seen += ["bool inputs:enableColorTemperature = 1", f"float inputs:colorTemperature = {hue}"]
             with layer.prim("SphereLight", "Glass", body=seen):
                 pass
+    with layer.root("Path"):
+        mesh = Mesh()
+        turned(mesh, [(7, 0), (7, 2), (2, 3), (2, 6), (0, 6)], 10, "Iron")
+        mesh.write(layer, "Foot")
+        seen = ["bool inputs:visibleInPrimaryRay = true", "float inputs:radius = 9", "float inputs:intensity = 9"]
+        with layer.prim("SphereLight", "Paper", body=[*place((0, 0, 15)), *seen, "color3f inputs:color = (1, 0.3, 0.06)"]):
+            pass
     with layer.root("Footlight"):
         mesh = Mesh()
         shell = [(10 * math.cos(t), 10 * math.sin(t)) for t in (math.pi + math.pi * k / 8 for k in range(9))]
         for (x0, y0), (x1, y1) in zip(shell, shell[1:]):
-            mesh.face([(x0, y0, 0), (x1, y1, 0), (x1, y1, 13), (x0, y0, 13)], "Tin")
+            mesh.face([(x0, y0, 0), (x1, y1, 0), (x1, y1, 13), (x0, y0, 13)], "Black")
         mesh.write(layer, "Shell", body=["uniform bool doubleSided = 1"])
-        light(layer, "SphereLight", "Lamp", (0, -2, 7), None, 2300, radius=2, intensity=8500)
+        light(layer, "SphereLight", "Lamp", (0, -2, 7), None, 2300, radius=2, intensity=6000)
     layer.save(folder)
 
 
@@ -213,6 +221,7 @@ def round_the_arch(layer):
     spots += [(0, (x, 38, 555 + z)) for x, z in resample(arc(0, 0, 134, 4, 176, 40, 0.8), 13)]
     spots += [(0, (x, 34, 535)) for x in range(-420, 421, 20)]
     bulbs(layer, "Bulbs", ["Marquee"], spots)
+    bulbs(layer, "PathLamps", ["Path"], [(0, (x, -34, 0)) for x in range(-265, 266, 106)])
     feet = [(0, (x, 10, FLOOR)) for x in range(-297, 298, 33)]
     bulbs(layer, "Footlights", ["Footlight"], feet)
 
@@ -228,14 +237,14 @@ def neon(layer, name, strokes, radius, step, color, nits, closed=False):
 
 def sign(layer):
     with layer.prim("Xform", "Neon", body=place((0, 40, 0))):
-        strokes, wide = word("LUNA", 0, 470, 48, 0.7)
+        strokes, wide = word("LUNA", 0, 478, 48, 0.7)
         neon(layer, "Letters", [[(x - wide / 2, z) for x, z in s] for s in strokes], 2.2, 5, (1, 0.06, 0.16), 46)
         outer = arc(-4, 604, 40, 62, 298, 26)
         inner = arc(12, 604, 36, 285, 75, 20)
         neon(layer, "Crescent", [outer + inner], 2.2, 5, (1, 0.62, 0.2), 46, closed=True)
         waves = []
         for side in (-1, 1):
-            path = [(side * (135 + 1.8 * t), 492 + 11 * math.sin(t * 0.28)) for t in range(0, 142, 2)]
+            path = [(side * (135 + 1.8 * t), 500 + 11 * math.sin(t * 0.28)) for t in range(0, 142, 2)]
             waves.append(path)
         neon(layer, "Waves", waves, 1.9, 6, (0.03, 0.62, 1.0), 34)
 
@@ -266,7 +275,7 @@ def revolving_lantern(layer):
             mesh.write(layer, "Lids")
             for k, color in enumerate([(1, 0.2, 0.05), (0.1, 0.9, 0.6), (1, 0.75, 0.2), (0.2, 0.45, 1)] * 2):
                 x, y = 32 * math.cos(math.pi * k / 4), 32 * math.sin(math.pi * k / 4)
-                seen = ["bool inputs:visibleInPrimaryRay = true", "float inputs:radius = 2.6", "float inputs:intensity = 420"]
+                seen = ["bool inputs:visibleInPrimaryRay = true", "float inputs:radius = 3.2", "float inputs:intensity = 60"]
                 with layer.prim("SphereLight", f"Bead{k}", body=[*place((x, y, 66)), *seen, f"color3f inputs:color = {vec(color)}"]):
                     pass
 
