@@ -214,6 +214,31 @@ def bulb_assets(folder):
     layer.save(folder)
 
 
+def flood_asset(folder):
+    """A flood with barn doors. UsdLux has no input for them, and light filters are read by few: these are four flaps."""
+    layer = Layer("assets/flood.usda", "A flood whose barn doors are flaps. It shines along -Z. Written by make.py.")
+    with layer.root("Flood"):
+        wide, high, long, open_to = 13, 9, 17, math.radians(24)
+        away, aside = long * math.cos(open_to), long * math.sin(open_to)
+        mesh = Mesh()
+        box(mesh, (-wide - 2, -high - 2, 0), (wide + 2, high + 2, 16), "Iron")
+        for side in (-1, 1):
+            y, x = side * high, side * wide
+            mesh.face([(-wide, y, 0), (wide, y, 0), (wide + 3, y + side * aside, -away), (-wide - 3, y + side * aside, -away)], "Black")
+            mesh.face([(x, -high, 0), (x, high, 0), (x + side * aside, high + 3, -away), (x + side * aside, -high - 3, -away)], "Black")
+        mesh.write(layer, "Case", body=["uniform bool doubleSided = 1"])
+        light(layer, "RectLight", "Lamp", (0, 0, -0.5), None, color=(0.3, 0.36, 1), width=24, height=16, intensity=15000)
+    layer.save(folder)
+
+
+def floods(layer):
+    """Two floods on the ground light the front."""
+    for side, name in ((-1, "FloodLeft"), (1, "FloodRight")):
+        meta = ["instanceable = true", "prepend references = @../assets/flood.usda@"]
+        with layer.prim("Xform", name, meta, place((side * 520, -260, 30), (133.6, 0, side * 50))):
+            pass
+
+
 def round_the_arch(layer):
     """Bulbs along the opening and the pediment."""
     outer = [(-OPENING - 8, FLOOR + 8), (-OPENING - 8, TOP + 12), (OPENING + 8, TOP + 12), (OPENING + 8, FLOOR + 8)]
@@ -282,6 +307,7 @@ def revolving_lantern(layer):
 
 def write(folder):
     bulb_assets(folder)
+    flood_asset(folder)
     layer = Layer("layers/theatre.usda", "The house, and what is fixed to it. Written by make.py.")
     with layer.root("Theatre", "group"):
         stage(layer)
@@ -292,4 +318,5 @@ def write(folder):
         round_the_arch(layer)
         sign(layer)
         revolving_lantern(layer)
+        floods(layer)
     layer.save(folder)
