@@ -3,7 +3,7 @@
 import math
 
 from parts.shapes import ball_profile, box, hanging, resample, turned
-from parts.usda import Dice, Layer, Mesh, light, noise, place
+from parts.usda import Dice, Layer, Mesh, noise, place
 
 from .theatre import bulbs
 
@@ -72,11 +72,11 @@ def glass_lantern(folder):
     variants = ['variants = { string panes = "glass" }', 'prepend variantSets = "panes"']
     with layer.root("GlassLantern"):
         mesh = Mesh()
-        turned(mesh, [(24, 0), (24, 5), (8, 10), (3.5, 14), (3.5, 128), (16, 133), (19, 136), (0, 136)], 12, "Iron")
+        turned(mesh, [(24, 0), (24, 5), (8, 10), (3.5, 14), (3.5, 128), (16, 133), (19, 136), (0, 136)], 12, "Black")
         for x in (-1, 1):
             for y in (-1, 1):
-                box(mesh, (x * 17 - 1.4, y * 17 - 1.4, 136), (x * 17 + 1.4, y * 17 + 1.4, 186), "Iron")
-        turned(mesh, [(0, 186), (28, 186), (24, 192), (7, 208), (3, 214), (0, 216)], 12, "Iron")
+                box(mesh, (x * 17 - 1.4, y * 17 - 1.4, 136), (x * 17 + 1.4, y * 17 + 1.4, 186), "Black")
+        turned(mesh, [(0, 186), (28, 186), (24, 192), (7, 208), (3, 214), (0, 216)], 12, "Black")
         turned(mesh, [(3, 136), (3, 152), (0, 152)], 8, "Ivory")
         mesh.write(layer, "Frame")
         with layer.prim("Xform", "Lamp", variants, place((0, 0, 160))):
@@ -95,7 +95,10 @@ def glass_lantern(folder):
             layer.put("}")
             layer.depth -= 1
             layer.put("}")
-            light(layer, "SphereLight", "Flame", (0, 0, 0), None, 2000, radius=3.5, intensity=5200)
+            seen = ["bool inputs:visibleInPrimaryRay = true", "float inputs:radius = 5", "float inputs:intensity = 1200"]
+            warm = ["bool inputs:enableColorTemperature = 1", "float inputs:colorTemperature = 2000"]
+            with layer.prim("SphereLight", "Flame", body=[*seen, *warm]):
+                pass
     layer.save(folder)
 
 

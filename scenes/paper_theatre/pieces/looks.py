@@ -102,7 +102,7 @@ def write(folder):
                 "bool inputs:thin_walled = 1",
                 "float inputs:transmission = 1",
                 "color3f inputs:transmission_color = (0.96, 0.9, 0.74)",
-                "float inputs:specular_roughness = 0.03",
+                "float inputs:specular_roughness = 0.02",
             ],
         )
         metal = ["float inputs:base = 1", "float inputs:metalness = 1"]

@@ -209,8 +209,9 @@ def bulb_assets(folder):
         shell = [(10 * math.cos(t), 10 * math.sin(t)) for t in (math.pi + math.pi * k / 8 for k in range(9))]
         for (x0, y0), (x1, y1) in zip(shell, shell[1:]):
             mesh.face([(x0, y0, 0), (x1, y1, 0), (x1, y1, 13), (x0, y0, 13)], "Black")
+        turned(mesh, [(15, 0.2), (15, 0.6), (0, 0.6)], 12, "Black")  # a tray: no hot spot on the boards
         mesh.write(layer, "Shell", body=["uniform bool doubleSided = 1"])
-        light(layer, "SphereLight", "Lamp", (0, -2, 7), None, 2300, radius=2, intensity=6000)
+        light(layer, "SphereLight", "Lamp", (0, -2, 8), None, 2300, radius=3.5, intensity=2000)
     layer.save(folder)
 
 
@@ -224,7 +225,8 @@ def flood_asset(folder):
         box(mesh, (-wide - 2, -high - 2, 0), (wide + 2, high + 2, 16), "Iron")
         for side in (-1, 1):
             y, x = side * high, side * wide
-            mesh.face([(-wide, y, 0), (wide, y, 0), (wide + 3, y + side * aside, -away), (-wide - 3, y + side * aside, -away)], "Black")
+            shut = aside if side > 0 else -3  # the lower flap is nearly closed: no light on the pillars' feet
+            mesh.face([(-wide, y, 0), (wide, y, 0), (wide + 3, y + side * shut, -away), (-wide - 3, y + side * shut, -away)], "Black")
             mesh.face([(x, -high, 0), (x, high, 0), (x + side * aside, high + 3, -away), (x + side * aside, -high - 3, -away)], "Black")
         mesh.write(layer, "Case", body=["uniform bool doubleSided = 1"])
         light(layer, "RectLight", "Lamp", (0, 0, -0.5), None, color=(0.3, 0.36, 1), width=24, height=16, intensity=15000)
