@@ -211,7 +211,7 @@ def bulb_assets(folder):
             mesh.face([(x0, y0, 0), (x1, y1, 0), (x1, y1, 13), (x0, y0, 13)], "Black")
         turned(mesh, [(15, 0.2), (15, 0.6), (0, 0.6)], 12, "Black")  # a tray: no hot spot on the boards
         mesh.write(layer, "Shell", body=["uniform bool doubleSided = 1"])
-        light(layer, "SphereLight", "Lamp", (0, -2, 8), None, 2300, radius=3.5, intensity=2000)
+        light(layer, "SphereLight", "Lamp", (0, -2, 8), None, 2300, radius=3.5, intensity=1100)
     layer.save(folder)
 
 
