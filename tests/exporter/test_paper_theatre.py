@@ -128,7 +128,8 @@ def test_the_moon_swells_and_brightens(theatre):
     for code, radius, nits in ((1001, 23.44, 11 + 2 / 12), (1012, 28.28, 13), (1024, 33.56, 13 + 6 * 12 / 13)):
         scale = np.cbrt(np.linalg.det(theatre.world(f"{LIGHTS}/PaperMoon", seconds(code))[:3, :3]))
         assert scale * moon["radius"] == pytest.approx(radius / 100, rel=1e-4)
-        assert np.interp(seconds(code), times, red) / red[0] == pytest.approx(nits / np.interp(1000 + times[0] * 24, [1000, 1012], [11, 13]), rel=1e-3)
+        first = np.interp(1000 + times[0] * 24, [1000, 1012], [11, 13])
+        assert np.interp(seconds(code), times, red) / red[0] == pytest.approx(nits / first, rel=1e-3)
 
 
 def test_the_lantern_revolves_and_its_lamps_with_it(theatre):

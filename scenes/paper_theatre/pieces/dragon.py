@@ -239,7 +239,8 @@ def head(layer):
     mesh = Mesh()
     for angle, long in ((-44, 52), (-22, 66), (0, 84), (22, 66), (44, 52)):
         x, z = turn(180 + angle, 1)
-        blade = [(-6, 0), (0.45 * long * x - 9 * z, 0.45 * long * z + 9 * x), (long * x, long * z), (0.45 * long * x + 9 * z, 0.45 * long * z - 9 * x)]
+        edges = [(0.45 * long * x - w * z, 0.45 * long * z + w * x) for w in (9, -9)]
+        blade = [(-6, 0), edges[0], (long * x, long * z), edges[1]]
         prism(_Standing(mesh), blade, -0.6 - angle / 90, 0.6 - angle / 90, "Flame" if angle % 44 else "CardGold")
     write_rigid(mesh, layer, "Tail", DRUMS - 1)
 

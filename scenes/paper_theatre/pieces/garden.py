@@ -8,6 +8,10 @@ from parts.usda import Dice, Layer, Mesh, noise, place
 from .theatre import bulbs
 
 
+CYPRESSES = [(-560, 170, 0.98), (-700, 60, 0.78), (560, 210, 1.04), (690, 40, 0.84), (-930, 500, 1.1), (900, 420, 1.0)]
+"""Where they stand, in centimetres, and how tall they are."""
+
+
 def cypress(folder):
     layer = Layer("assets/cypress.usda", "A cypress. Written by make.py.")
     with layer.root("Cypress"):
@@ -35,7 +39,11 @@ def cypress(folder):
 def people(folder):
     """Sitting, seen from behind."""
     layer = Layer("assets/people.usda", "People of the audience, and their bench. Written by make.py.")
-    for name, coat, tall, wide, hat in (("Anna", "CoatA", 1.0, 1.0, False), ("Bruno", "CoatB", 1.06, 1.12, True), ("Child", "CoatC", 0.8, 0.78, False)):
+    for name, coat, tall, wide, hat in (
+        ("Anna", "CoatA", 1.0, 1.0, False),
+        ("Bruno", "CoatB", 1.06, 1.12, True),
+        ("Child", "CoatC", 0.8, 0.78, False),
+    ):
         with layer.root(name):
             mesh = Mesh()
             outline = [(17, 40), (18, 60), (20, 82), (21, 94), (15, 101), (6, 104), (5.5, 108)]
@@ -119,7 +127,7 @@ def write(folder):
         mesh.face([(-420, -1500, 0.6), (420, -1500, 0.6), (420, -20, 0.6), (-420, -20, 0.6)], "Gravel")
         box(mesh, (-2600, 640, 0), (2600, 700, 210), "Hedge", "z-")
         mesh.write(layer, "Ground")
-        for k, (x, y, tall) in enumerate(((-560, 170, 0.98), (-700, 60, 0.78), (560, 210, 1.04), (690, 40, 0.84), (-930, 500, 1.1), (900, 420, 1.0))):
+        for k, (x, y, tall) in enumerate(CYPRESSES):
             instance(layer, "cypress", f"Cypress{k}", (x, y, 0), 77 * k, (0.9 + 0.1 * (k % 2), 0.9, tall))
         with layer.prim("Scope", "Audience"):
             dice = Dice(5)

@@ -72,6 +72,7 @@ def write(folder):
         skinned(layer, trunk, "Trunk", between)
         crown = Mesh()
         for x, y, z, radius in ((-34, -6, 118, 36), (30, 4, 152, 42), (-26, 2, 190, 46), (22, -4, 218, 38), (-6, 0, 246, 40)):
-            turned(crown, [(0, -5), (radius * 0.9, -5), (radius, 0), (radius * 0.75, 8), (radius * 0.3, 13), (0, 14)], 16, "PineLeaf", (x, y, z))
+            pad = [(0, -5), (0.9, -5), (1, 0), (0.75, 8), (0.3, 13), (0, 14)]
+            turned(crown, [(radius * r, up) for r, up in pad], 16, "PineLeaf", (x, y, z))
         skinned(layer, crown, "Crown", between)
     layer.save(folder)
