@@ -2,7 +2,7 @@
 
 use super::path::{Integrator, PathScratch, TraceStats, Vertex};
 use super::picker::{LightPick, PickScratch, Wanted};
-use super::rays::{Anchor, Caster};
+use super::rays::{Anchor, Caster, Hit};
 use crate::light_tree::{Picked, Splitting};
 use crate::math::built_in;
 use crate::math::color::{Rgb, luminance};
@@ -178,7 +178,7 @@ impl Integrator<'_> {
     }
 
     /// The share of the light that reaches a point: zero if anything blocks it, else the transmittance of
-    /// the fog.
+    /// the fog and of the panes on the way.
     pub fn arriving(
         &self,
         at: &Anchor,
@@ -190,33 +190,34 @@ impl Integrator<'_> {
             Some(light) => (light.position - at.position).length(),
             None => f32::INFINITY,
         };
-        let blocked = match self.links.zip(incoming.shadow_set) {
-            None => self.is_blocked(at, incoming, accept, &|_| true),
+        let share = match self.links.zip(incoming.shadow_set) {
+            None => self.unblocked(at, incoming, accept, &|_| true),
             Some((links, set)) => {
-                self.is_blocked(at, incoming, accept, &|caster| links.casts(set, caster))
+                self.unblocked(at, incoming, accept, &|caster| links.casts(set, caster))
             }
         };
-        if blocked {
+        if share == Rgb::ZERO {
             return Rgb::ZERO;
         }
         let through = |fog: &super::fog::Fog| fog.transmittance(at.position, direction, length);
-        self.fog.as_ref().filter(|_| built_in::FOG).map_or(Rgb::ONE, through)
+        self.fog.as_ref().filter(|_| built_in::FOG).map_or(share, |fog| share * through(fog))
     }
 
-    /// Whether any prim that `casts` names is between a point and a light.
-    fn is_blocked(
+    /// The share of light that the prims that `casts` names let through between a point and a light.
+    fn unblocked(
         &self,
         at: &Anchor,
         incoming: &Incoming,
         accept: &impl Fn(u32, u32, Vec2) -> bool,
         casts: &impl Fn(Caster) -> bool,
-    ) -> bool {
+    ) -> Rgb {
         let direction = incoming.direction;
+        let tint = |pane: &Hit| self.surfaces.tint(pane, direction);
         match &incoming.from {
-            Some(light) => self.tracer.occluded_between_by(at, light, accept, casts),
+            Some(light) => self.tracer.transmitted_between(at, light, accept, casts, &tint),
             None => {
-                let origin = at.origin_toward(direction);
-                self.tracer.occluded_by(origin, direction, f32::INFINITY, accept, casts)
+                let ray = (at.origin_toward(direction), direction, f32::INFINITY);
+                self.tracer.transmitted(ray, accept, casts, &tint)
             }
         }
     }

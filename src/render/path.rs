@@ -13,8 +13,9 @@ use super::fog::Fog;
 use super::knob::Trial;
 use super::light_groups::LightGroups;
 use super::links::FrameLinks;
+use super::panes::Drawn;
 use super::picker::{LightPicker, PickScratch, Site, Wanted};
-use super::rays::{Anchor, Hit, HitSurface, Seen, SeenLight, Sender, Tracer};
+use super::rays::{Anchor, Hit, HitSurface, Passed, Seen, Sender, Tracer};
 use super::settings::RenderSettings;
 use super::surface::Surfaces;
 use crate::emitter::{EmitterHit, InfiniteLight, PosedEmitters};
@@ -138,7 +139,7 @@ pub struct Vertex {
 #[derive(Debug, Default)]
 pub struct PathScratch {
     pub(super) picks: PickScratch,
-    lights: Vec<SeenLight>,
+    passed: Passed,
     /// Light of the last path towards the eye by light group, nits; empty unless that is asked for.
     pub by_group: Vec<Rgb>,
     /// Sum of the squared luminance of what the last path would have got from lights that were picked
@@ -175,10 +176,14 @@ impl Integrator<'_> {
         for bounce in 0..=self.settings.depth {
             scratch.stats.rays += 1;
             let sender = if bounce == 0 { Sender::Camera } else { Sender::Surface };
-            let mut lights = std::mem::take(&mut scratch.lights);
+            let mut passed = std::mem::take(&mut scratch.passed);
             let ray = (origin, direction, reach_m);
-            let Seen { hit, in_shade } = self.tracer.look(sender, ray, &accept, &mut lights);
+            let Seen { hit, in_shade } = self.tracer.look(sender, ray, &accept, &mut passed);
             reach_m = f32::INFINITY;
+            let meets_panes = built_in::TRANSMISSION && !passed.panes.is_empty();
+            if meets_panes {
+                self.tint_panes(&mut passed, direction);
+            }
             if built_in::FOG
                 && let Some(fog) = &self.fog
             {
@@ -188,36 +193,45 @@ impl Integrator<'_> {
                     let stretch = (origin, direction, length);
                     let numbers = (numbers, salt);
                     let at = (bounce, throughput);
-                    let light = self.scattered(fog, stretch, numbers, &accept, at, scratch);
+                    let light =
+                        self.scattered((fog, &passed), stretch, numbers, &accept, at, scratch);
                     seen.add(bounce + 1, throughput * light);
                 }
             }
-            for SeenLight { hit, .. } in &lights {
-                let arriving = throughput * self.through_fog(origin, direction, hit.t);
-                seen.add(bounce, self.emitted(hit, direction, &before, arriving, scratch));
+            for light in &passed.lights {
+                let arriving = throughput * self.through_fog(origin, direction, light.hit.t);
+                let arriving = arriving * passed.tint_of(light);
+                seen.add(bounce, self.emitted(&light.hit, direction, &before, arriving, scratch));
             }
-            scratch.lights = lights;
-            let length = hit.as_ref().map_or(f32::INFINITY, |hit| hit.t);
-            throughput *= self.through_fog(origin, direction, length);
-            let Some(hit) = hit else {
-                if !in_shade {
-                    let light = self.emitted_at_infinity(direction, &before, throughput, scratch);
-                    seen.add(bounce, throughput * light);
+            if hit.is_none() && !in_shade {
+                let arriving = self.through_fog(origin, direction, f32::INFINITY);
+                let arriving = throughput * arriving * passed.tint_of_sky();
+                let light = self.emitted_at_infinity(direction, &before, arriving, scratch);
+                seen.add(bounce, arriving * light);
+            }
+            let first = passed.met().next().map_or(hit, |pane| Some(pane.hit));
+            let drawn = match (meets_panes, hit) {
+                (false, None) => Drawn::default(),
+                (false, Some(hit)) => self.at_end((origin, direction), &hit),
+                (true, _) => {
+                    let [u, ..] = sampler.next_4d();
+                    self.through_panes((origin, direction), &passed, hit, u)
                 }
-                break;
             };
-            let wo = -direction;
-            let vertex = self.vertex(&hit, wo);
-            if bounce == 0 {
+            scratch.passed = passed;
+            if let Some(hit) = first.filter(|_| bounce == 0) {
+                // Of a pane, not of what is seen through it; but the albedo is of both.
+                let own = if meets_panes { self.vertex(&hit, -direction) } else { drawn.vertex };
                 seen.hit = Some(hit);
                 seen.depth_m = self.camera.depth_m(hit.anchor.position);
-                seen.normal = vertex.as_ref().map_or(hit.anchor.normal, |v| v.receiver.normal);
-                seen.albedo = vertex.as_ref().map_or(Rgb::ZERO, |v| {
-                    let (specular, diffuse) = v.reflection.albedo();
-                    specular + diffuse
-                });
+                seen.normal = own.map_or(hit.anchor.normal, |v| v.receiver.normal);
+                seen.albedo = match meets_panes {
+                    true => drawn.albedo,
+                    false => own.map_or(Rgb::ZERO, |v| v.reflection.whole_albedo()),
+                };
             }
-            let Some(vertex) = vertex.filter(|_| bounce < self.settings.depth) else { break };
+            throughput *= drawn.weight;
+            let Some(vertex) = drawn.vertex.filter(|_| bounce < self.settings.depth) else { break };
 
             let wanted = self.wanted(&vertex, &mut sampler, hash(seed, bounce));
             let [pick, lu, lv, roulette] = sampler.next_4d();
@@ -294,7 +308,7 @@ impl Integrator<'_> {
     }
 
     /// The share of light that fog lets through along a stretch of a ray.
-    fn through_fog(&self, origin: Vec3, direction: Vec3, length: f32) -> Rgb {
+    pub(super) fn through_fog(&self, origin: Vec3, direction: Vec3, length: f32) -> Rgb {
         let through = |fog: &Fog| fog.transmittance(origin, direction, length);
         self.fog.as_ref().filter(|_| built_in::FOG).map_or(Rgb::ONE, through)
     }

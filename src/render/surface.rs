@@ -10,8 +10,8 @@
 //! away from `wo` is bent back until `wo` is above its horizon. It is not bent past the cosine between
 //! `wo` and the triangle's normal: a flat surface is never bent, however grazing `wo` is.
 
-use super::bsdf::{Bsdf, SurfaceSample};
-use super::rays::Anchor;
+use super::bsdf::{ALPHA_MIN, Bsdf, SurfaceSample};
+use super::rays::{Anchor, Hit, HitSurface};
 use crate::math::color::Rgb;
 use crate::math::directions::mirrors;
 use crate::math::{Frame, built_in};
@@ -21,6 +21,12 @@ use std::ops::{Add, Mul};
 
 /// The smallest cosine between `wo` and a shading normal that is not the triangle's own.
 const LEAST_COSINE: f32 = 1e-3;
+
+/// Whether a material is a pane: thin glass, so smooth that light passes it straight. Its GGX alpha is at most
+/// [`ALPHA_MIN`] everywhere, which is that of a roughness of 0.0316.
+pub fn is_pane(material: &Material) -> bool {
+    material.transmission.is_some() && material.roughness * material.roughness <= ALPHA_MIN
+}
 
 /// Looks up what is at a hit, for one pose of a scene.
 #[derive(Clone, Debug)]
@@ -99,6 +105,20 @@ impl<'a> Surfaces<'a> {
         Surface { anchor, front, frame, sample: self.evaluate(&at, material) }
     }
 
+    /// The share of light that a pane lets through along a unit direction, either way; none if the hit is on something
+    /// else.
+    pub fn tint(&self, pane: &Hit, direction: Vec3) -> Rgb {
+        let HitSurface::Triangle { instance, triangle, barycentric } = pane.surface else {
+            return Rgb::ZERO;
+        };
+        let (at, material) = self.locate(instance, triangle, barycentric);
+        let node = self.scene.instances[instance as usize].node;
+        let to_world = self.pose.world(node);
+        // Not bent towards either end, so that both ends see the same tint.
+        let normal = self.shading_normal(&at, material, &to_world, pane.anchor.normal);
+        self.evaluate(&at, material).tint(normal.dot(direction).abs())
+    }
+
     fn locate(&self, instance: u32, triangle: u32, barycentric: Vec2) -> (At<'a>, &Material) {
         let mesh = &self.scene.meshes[self.scene.instances[instance as usize].mesh as usize];
         let corners = mesh.triangles[triangle as usize].map(|corner| corner as usize);
@@ -133,6 +153,12 @@ impl<'a> Surfaces<'a> {
                 coat.roughness * self.lookup(at, &coat.roughness_texture).y,
             ),
         };
+        let transmission = match &material.transmission {
+            Some(passes) if built_in::TRANSMISSION && is_pane(material) => {
+                passes.factor * self.lookup(at, &passes.factor_texture).x
+            }
+            _ => 0.0,
+        };
         SurfaceSample {
             base_color: material.base_color * base.truncate(),
             metallic: material.metallic * rough_metal.z,
@@ -141,6 +167,7 @@ impl<'a> Surfaces<'a> {
             dielectric_f90: specular,
             coat,
             coat_roughness,
+            transmission,
         }
     }
 

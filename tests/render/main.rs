@@ -18,6 +18,7 @@ mod linking;
 mod moving;
 mod noise;
 mod occluders;
+mod panes;
 mod ranges;
 mod real;
 mod references;

@@ -3,10 +3,10 @@
 //! All are seen in the same way: from above, floor only, so that no light is in the picture and
 //! its mean is reflected light alone. A wall stands behind, a card throws a shadow.
 
-use crate::stage::{Stage, aimed, at, coat, facing, glow, lambert, picture, scaled};
+use crate::stage::{Stage, aimed, at, coat, facing, filter, glow, lambert, picture, scaled};
 use candelabra::scene::{
     AlphaMode, IesProfile, IesTable, LightKind, Material, Node, Pixels, Pole, Shaping, Texture,
-    TextureUse, Wrap,
+    TextureUse, Transmission, Wrap,
 };
 use glam::{DVec3, Vec3};
 use std::f64::consts::{PI, TAU};
@@ -291,6 +291,23 @@ fn cut_outs(stage: &mut Stage, alpha_mode: AlphaMode) {
     stage.quad([0.6; 2], shining, facing(place, DVec3::ZERO));
 }
 
+/// Panes that lie above the floor and stand before the eye; one shines, one is a cut-out. What they mirror is rough,
+/// or picking alone could not find it.
+fn panes(stage: &mut Stage) {
+    some_lights(stage);
+    let tinted = Material { coat: coat(1.0, 0.4), ..filter(Vec3::new(0.9, 0.6, 0.8)) };
+    stage.quad([2.0, 1.0], tinted.clone(), facing(DVec3::Y * 0.55, DVec3::new(0.2, 2.0, 0.1)));
+    let transmission = Some(Transmission { factor: 0.7, factor_texture: None });
+    let front = Material { transmission, ..tinted };
+    stage.quad([2.0; 2], front, facing(DVec3::new(0.0, 1.1, 1.4), DVec3::ZERO));
+    let shining = Material { emission_nits: Vec3::new(1.0, 2.0, 3.0), ..filter(Vec3::splat(0.5)) };
+    stage.quad([0.7; 2], shining, facing(DVec3::new(-0.3, 0.7, 0.2), DVec3::ZERO));
+    let base_color_texture = holes(stage);
+    let alpha_mode = AlphaMode::Blend;
+    let holed = Material { base_color_texture, alpha_mode, ..filter(Vec3::splat(0.7)) };
+    stage.quad([1.5; 2], holed, facing(DVec3::new(0.5, 0.4, 0.0), DVec3::new(0.5, 2.0, 0.3)));
+}
+
 pub fn of_every_material() -> Vec<Room> {
     let metal = |roughness| Material {
         base_color: Vec3::new(0.9, 0.7, 0.4),
@@ -307,6 +324,8 @@ pub fn of_every_material() -> Vec<Room> {
         room("varnish", varnish, some_lights),
         room("a coat on plaster", paint(1.0, 0.3), some_lights),
         room("a thin coat on metal", Material { coat: coat(0.5, 0.4), ..metal(0.7) }, some_lights),
+        room("panes", plaster(), panes),
+        room("panes above a smooth metal", metal(0.4), panes),
         room("masked cut-outs", plaster(), |stage| cut_outs(stage, AlphaMode::Mask(0.5))),
         room("blended cut-outs", plaster(), |stage| cut_outs(stage, AlphaMode::Blend)),
         room("a normal map", plaster(), |stage| {

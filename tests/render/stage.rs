@@ -10,7 +10,7 @@ use candelabra::render::buffers::RenderBuffers;
 use candelabra::render::{LightStrategy, RenderDelegate, RenderSettings};
 use candelabra::scene::{
     Camera, Coat, Instance, Light, LightKind, Material, Mesh, Node, Pixels, Scene, Texture,
-    TextureUse, Trs, Wrap,
+    TextureUse, Transmission, Trs, Wrap,
 };
 use candelabra::store::AlignedBytes;
 use glam::{DQuat, DVec3, Vec2, Vec3};
@@ -65,6 +65,17 @@ pub fn lambert(albedo: impl Into<Vec3>) -> Material {
 /// What a material is coated with.
 pub fn coat(factor: f32, roughness: f32) -> Option<Coat> {
     Some(Coat { factor, factor_texture: None, roughness, roughness_texture: None })
+}
+
+/// A pane of smooth glass of some colour that mirrors nothing: it lets through the colour's share at every angle.
+pub fn filter(color: impl Into<Vec3>) -> Material {
+    let transmission = Some(Transmission { factor: 1.0, factor_texture: None });
+    Material { transmission, roughness: 0.0, ..lambert(color) }
+}
+
+/// The same with the reflections of glass.
+pub fn pane(color: impl Into<Vec3>) -> Material {
+    Material { specular: 1.0, ..filter(color) }
 }
 
 /// A black surface that shines from its front.

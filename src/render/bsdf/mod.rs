@@ -61,6 +61,27 @@ pub struct SurfaceSample {
     pub coat: f32,
     /// Perceptual roughness of the coat.
     pub coat_roughness: f32,
+    /// The share of the diffuse lobe's light that passes straight instead.
+    pub transmission: f32,
+}
+
+impl SurfaceSample {
+    /// The share of light that passes straight in a direction with this cosine to the normal: what neither the coat
+    /// nor the specular lobe reflects, times the base colour. With [`Reflection::albedo`] it adds up to 1 where
+    /// everything is white.
+    pub fn tint(&self, cosine: f32) -> Rgb {
+        let bsdf = Bsdf::new(self, Frame::around(Vec3::Z));
+        let whole = bsdf.passing;
+        if whole == Rgb::ZERO || !bsdf.is_glossy() {
+            return whole;
+        }
+        let (gloss, _) = bsdf.gloss(Albedo::of_ggx(cosine, bsdf.alpha));
+        let below = match bsdf.coat > 0.0 {
+            true => 1.0 - Coat::toward(cosine, bsdf.coat, bsdf.coat_alpha).0,
+            false => 1.0,
+        };
+        whole * (Rgb::ONE - gloss) * below
+    }
 }
 
 /// A reflecting point. Directions are unit, world space, and point away from the surface.
@@ -68,6 +89,8 @@ pub struct SurfaceSample {
 pub struct Bsdf {
     frame: Frame,
     diffuse: Rgb,
+    /// What would pass if nothing were reflected.
+    passing: Rgb,
     metal_f0: Rgb,
     dielectric_f0: Rgb,
     dielectric_f90: f32,
@@ -138,9 +161,11 @@ impl Bsdf {
         let unit_rgb = |c: Rgb| Rgb::new(unit(c.x), unit(c.y), unit(c.z));
         let (metallic, roughness) = (unit(sample.metallic), unit(sample.roughness));
         let base = unit_rgb(sample.base_color);
+        let transmission = unit(sample.transmission);
         Bsdf {
             frame,
-            diffuse: base * ((1.0 - metallic) * FRAC_1_PI),
+            diffuse: base * ((1.0 - metallic) * FRAC_1_PI) * (1.0 - transmission),
+            passing: base * ((1.0 - metallic) * transmission),
             metal_f0: base,
             dielectric_f0: unit_rgb(sample.dielectric_f0),
             dielectric_f90: unit(sample.dielectric_f90),
@@ -155,6 +180,14 @@ impl Bsdf {
     fn is_glossy(&self) -> bool {
         let is_dielectric = self.dielectric_f90 > 0.0 || self.dielectric_f0 != Rgb::ZERO;
         built_in::GLOSSY && (is_dielectric || self.metallic > 0.0 || self.coat > 0.0)
+    }
+
+    /// The albedo of the dielectric's specular lobe, of the table's parts, and the gain that is in it.
+    fn gloss(&self, part: Albedo) -> (Rgb, Rgb) {
+        let lost = (1.0 - part.a - part.b).max(0.0) / (part.a + part.b);
+        let gain = Rgb::ONE + self.dielectric_f0 * lost;
+        let f90 = Rgb::splat(self.dielectric_f90);
+        (((self.dielectric_f0 * part.a + f90 * part.b) * gain).min(Rgb::ONE), gain)
     }
 
     /// Towards `wo`.
@@ -183,8 +216,7 @@ impl Bsdf {
         let part = Albedo::of_ggx(wo.z, self.alpha);
         let lost = (1.0 - part.a - part.b).max(0.0) / (part.a + part.b);
         let (f0, f90) = (self.dielectric_f0, Rgb::splat(self.dielectric_f90));
-        let gloss_gain = Rgb::ONE + f0 * lost;
-        let gloss = ((f0 * part.a + f90 * part.b) * gloss_gain).min(Rgb::ONE);
+        let (gloss, gloss_gain) = self.gloss(part);
         let metal_gain = Rgb::ONE + self.metal_f0 * lost;
         let metal = (self.metal_f0 * part.a + part.b) * metal_gain;
         reflection.diffuse = self.diffuse * (Rgb::ONE - gloss);
@@ -281,6 +313,12 @@ impl Reflection {
             specular += self.coat.albedo(Albedo::of_ggx(self.wo.z, self.coat.alpha));
         }
         (specular, self.diffuse / FRAC_1_PI)
+    }
+
+    /// Both together.
+    pub fn whole_albedo(&self) -> Rgb {
+        let (specular, diffuse) = self.albedo();
+        specular + diffuse
     }
 
     #[inline]

@@ -22,6 +22,7 @@ fn dielectric(base: f32, roughness: f32) -> SurfaceSample {
         dielectric_f90: 1.0,
         coat: 0.0,
         coat_roughness: 0.0,
+        transmission: 0.0,
     }
 }
 
@@ -206,6 +207,7 @@ fn the_horizon_and_the_mirror_stay_finite() {
         dielectric_f90: f32::INFINITY,
         coat: f32::INFINITY,
         coat_roughness: -1.0,
+        transmission: f32::NAN,
     };
     let mirrors = coated(metal(1.0, 0.0), 1.0, 0.0);
     for sample in [wild, mirrors, metal(1.0, 0.0), dielectric(1.0, 0.0), dielectric(0.0, 1.0)] {
