@@ -251,7 +251,7 @@ impl Integrator<'_> {
             let Some(incoming) = self.incoming(pick.light, point, Vec3::ZERO, u) else { return };
             stats.rays += 1;
             stats.shadow_rays += 1;
-            let arriving = self.arriving(&Anchor::free(point), &incoming, accept);
+            let arriving = self.arriving_within(None, &Anchor::free(point), &incoming, accept);
             let turned = f64::from(fog.phase(incoming.direction, direction));
             let density = pick.probability * pdf * f64::from(incoming.pdf.unwrap_or(1.0));
             let weight = (turned / density) as f32;

@@ -8,7 +8,7 @@
 //!
 //! One search of the ray finds all panes before its end, however many, so nothing has to be bounded.
 
-use super::path::{Integrator, Vertex};
+use super::path::{Inside, Integrator, Vertex};
 use super::rays::{Hit, Passed};
 use crate::math::color::Rgb;
 use glam::Vec3;
@@ -26,6 +26,14 @@ pub(super) struct Drawn {
 }
 
 impl Integrator<'_> {
+    /// The vertex at a hit of a path that came through something.
+    fn vertex_within(&self, inside: Inside, hit: &Hit, wo: Vec3) -> Option<Vertex> {
+        let vertex = self.vertex(hit, wo)?;
+        // A wall without thickness has the same on both sides.
+        let beyond = if vertex.here == vertex.beyond { inside } else { vertex.beyond };
+        Some(Vertex { here: inside, beyond, ..vertex })
+    }
+
     /// Tints the panes that a ray passes.
     pub(super) fn tint_panes(&self, passed: &mut Passed, direction: Vec3) {
         for pane in &mut passed.panes {
@@ -34,9 +42,15 @@ impl Integrator<'_> {
     }
 
     /// Where the path of a ray that passes no panes goes on.
-    pub(super) fn at_end(&self, (origin, direction): (Vec3, Vec3), end: &Hit) -> Drawn {
-        let vertex = self.vertex(end, -direction);
-        Drawn { vertex, weight: self.through_fog(origin, direction, end.t), albedo: Rgb::ZERO }
+    pub(super) fn at_end(
+        &self,
+        (origin, direction): (Vec3, Vec3),
+        inside: Inside,
+        end: &Hit,
+    ) -> Drawn {
+        let vertex = self.vertex_within(inside, end, -direction);
+        let weight = self.through(inside, origin, direction, end.t);
+        Drawn { vertex, weight, albedo: Rgb::ZERO }
     }
 
     /// Draws where the path of a ray that passes panes goes on: at one of them or at its end. `u` is a random number
@@ -44,6 +58,7 @@ impl Integrator<'_> {
     pub(super) fn through_panes(
         &self,
         (origin, direction): (Vec3, Vec3),
+        inside: Inside,
         passed: &Passed,
         end: Option<Hit>,
         mut u: f32,
@@ -52,10 +67,10 @@ impl Integrator<'_> {
         let (mut share, mut sum, mut chosen) = (Rgb::ONE, 0.0, 0.0);
         let panes = passed.met().map(|pane| (pane.hit, pane.tint));
         for (hit, tint) in panes.chain(end.map(|hit| (hit, Rgb::ZERO))) {
-            if let Some(vertex) = self.vertex(&hit, -direction) {
+            if let Some(vertex) = self.vertex_within(inside, &hit, -direction) {
                 let reflected = share * vertex.reflection.whole_albedo();
                 drawn.albedo += reflected;
-                let arriving = share * self.through_fog(origin, direction, hit.t);
+                let arriving = share * self.through(inside, origin, direction, hit.t);
                 let chance = (arriving * vertex.reflection.whole_albedo()).max_element();
                 sum += chance;
                 // A reservoir: each takes the place of those before it with its share of all so far.

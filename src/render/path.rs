@@ -120,6 +120,9 @@ struct Origin {
     bsdf_pdf: f32,
 }
 
+/// What a stretch of a path goes through: solid glass of some absorption, 1/m, or what fills the space.
+pub type Inside = Option<Rgb>;
+
 /// A point on the way, about to be lit.
 #[derive(Clone, Copy)]
 pub struct Vertex {
@@ -129,8 +132,12 @@ pub struct Vertex {
     pub reflection: Reflection,
     /// Towards the point before it, unit, world space.
     pub wo: Vec3,
-    /// What the tree is asked for.
+    /// What the tree is asked for. It has no normal where light from either side is wanted.
     pub receiver: Receiver,
+    /// What is on this side.
+    pub here: Inside,
+    /// What is on the other.
+    pub beyond: Inside,
     /// Which lights light it.
     pub class: ReceiverClass,
 }
@@ -173,6 +180,7 @@ impl Integrator<'_> {
         scratch.by_group.resize(self.groups.map_or(0, |groups| groups.names().len()), Rgb::ZERO);
         let mut throughput = Rgb::ONE;
         let mut before: Option<Origin> = None;
+        let mut inside: Inside = None;
         for bounce in 0..=self.settings.depth {
             scratch.stats.rays += 1;
             let sender = if bounce == 0 { Sender::Camera } else { Sender::Surface };
@@ -180,12 +188,19 @@ impl Integrator<'_> {
             let ray = (origin, direction, reach_m);
             let Seen { hit, in_shade } = self.tracer.look(sender, ray, &accept, &mut passed);
             reach_m = f32::INFINITY;
+            if built_in::TRANSMISSION
+                && bounce == 0
+                && let Some(hit) = &hit
+            {
+                inside = self.sides(hit, -direction)[0];
+            }
             let meets_panes = built_in::TRANSMISSION && !passed.panes.is_empty();
             if meets_panes {
                 self.tint_panes(&mut passed, direction);
             }
             if built_in::FOG
                 && let Some(fog) = &self.fog
+                && inside.is_none()
             {
                 let length = hit.as_ref().map_or(f32::INFINITY, |hit| hit.t);
                 if bounce < self.settings.depth {
@@ -199,12 +214,12 @@ impl Integrator<'_> {
                 }
             }
             for light in &passed.lights {
-                let arriving = throughput * self.through_fog(origin, direction, light.hit.t);
+                let arriving = throughput * self.through(inside, origin, direction, light.hit.t);
                 let arriving = arriving * passed.tint_of(light);
                 seen.add(bounce, self.emitted(&light.hit, direction, &before, arriving, scratch));
             }
             if hit.is_none() && !in_shade {
-                let arriving = self.through_fog(origin, direction, f32::INFINITY);
+                let arriving = self.through(inside, origin, direction, f32::INFINITY);
                 let arriving = throughput * arriving * passed.tint_of_sky();
                 let light = self.emitted_at_infinity(direction, &before, arriving, scratch);
                 seen.add(bounce, arriving * light);
@@ -212,10 +227,10 @@ impl Integrator<'_> {
             let first = passed.met().next().map_or(hit, |pane| Some(pane.hit));
             let drawn = match (meets_panes, hit) {
                 (false, None) => Drawn::default(),
-                (false, Some(hit)) => self.at_end((origin, direction), &hit),
+                (false, Some(hit)) => self.at_end((origin, direction), inside, &hit),
                 (true, _) => {
                     let [u, ..] = sampler.next_4d();
-                    self.through_panes((origin, direction), &passed, hit, u)
+                    self.through_panes((origin, direction), inside, &passed, hit, u)
                 }
             };
             scratch.passed = passed;
@@ -224,7 +239,7 @@ impl Integrator<'_> {
                 let own = if meets_panes { self.vertex(&hit, -direction) } else { drawn.vertex };
                 seen.hit = Some(hit);
                 seen.depth_m = self.camera.depth_m(hit.anchor.position);
-                seen.normal = own.map_or(hit.anchor.normal, |v| v.receiver.normal);
+                seen.normal = own.map_or(hit.anchor.normal, |v| v.reflection.normal());
                 seen.albedo = match meets_panes {
                     true => drawn.albedo,
                     false => own.map_or(Rgb::ZERO, |v| v.reflection.whole_albedo()),
@@ -262,6 +277,9 @@ impl Integrator<'_> {
             before = Some(Origin { wanted, how, point, normal, bsdf_pdf: next.pdf });
             origin = vertex.anchor.origin_toward(next.wi);
             direction = next.wi;
+            if vertex.is_beyond(next.wi) {
+                inside = vertex.beyond;
+            }
             if is_last && !self.may_find_light(origin, direction) {
                 break;
             }
@@ -284,10 +302,19 @@ impl Integrator<'_> {
             return None;
         };
         let surface = self.surfaces.at(instance, triangle, barycentric, hit.anchor, wo);
-        let receiver = Receiver { point: hit.anchor.position, normal: surface.frame.normal };
         let reflection = surface.bsdf().toward(wo);
+        let normal = if reflection.transmits() { Vec3::ZERO } else { surface.frame.normal };
+        let receiver = Receiver { point: hit.anchor.position, normal };
         let class = self.links.map_or(ReceiverClass::ALL, |links| links.of_instance(instance));
-        Some(Vertex { anchor: hit.anchor, reflection, wo, receiver, class })
+        let [here, beyond] = self.sides(hit, wo);
+        Some(Vertex { anchor: hit.anchor, reflection, wo, receiver, here, beyond, class })
+    }
+
+    /// What is on the side of `wo` of a surface, and what on the other. Only solid glass knows.
+    fn sides(&self, hit: &Hit, wo: Vec3) -> [Inside; 2] {
+        let HitSurface::Triangle { instance, .. } = hit.surface else { return [None; 2] };
+        let volume = self.surfaces.volume(instance);
+        if hit.anchor.normal.dot(wo) >= 0.0 { [None, volume] } else { [volume, None] }
     }
 
     /// What lights are picked for at a vertex.
@@ -307,8 +334,17 @@ impl Integrator<'_> {
         cells.find(point, normal, (hash(salt, CELL) >> 8) as f32 / 16_777_216.0)
     }
 
-    /// The share of light that fog lets through along a stretch of a ray.
-    pub(super) fn through_fog(&self, origin: Vec3, direction: Vec3, length: f32) -> Rgb {
+    /// The share of light that fog or glass lets through along a stretch of a ray.
+    pub(super) fn through(
+        &self,
+        inside: Inside,
+        origin: Vec3,
+        direction: Vec3,
+        length: f32,
+    ) -> Rgb {
+        if let Some(absorption) = inside.filter(|_| built_in::TRANSMISSION) {
+            return (absorption * -length.min(f32::MAX)).exp();
+        }
         let through = |fog: &Fog| fog.transmittance(origin, direction, length);
         self.fog.as_ref().filter(|_| built_in::FOG).map_or(Rgb::ONE, through)
     }
@@ -431,7 +467,9 @@ impl Vertex {
         let receiver = self.receiver;
         let is_glossy =
             |lobes: &Lobes| built_in::GLOSSY && lobes.at_normal + lobes.toward_grazing > 0.0;
-        let Some(lobes) = self.reflection.lobes().filter(is_glossy) else {
+        // Where light passes, lights on both sides are wanted: a site without a horizon.
+        let lobes = self.reflection.lobes().filter(|_| !self.reflection.transmits());
+        let Some(lobes) = lobes.filter(is_glossy) else {
             return self.wanted_at(Site::At(receiver));
         };
         // Independent of the direction in which the path continues: that one may hit a light, whose
@@ -450,8 +488,17 @@ impl Vertex {
     }
 
     /// Whether `wi` is on the same side as `wo` of the geometric surface, and not only of the shading
-    /// normal.
+    /// normal; where light passes, whether it is on the same side of both.
     pub fn lets_through(&self, wi: Vec3) -> bool {
-        self.anchor.normal.dot(wi) * self.anchor.normal.dot(self.wo) > 0.0
+        let is_same_side = self.anchor.normal.dot(wi) * self.anchor.normal.dot(self.wo) > 0.0;
+        if self.reflection.transmits() {
+            return is_same_side == self.reflection.is_above(wi);
+        }
+        is_same_side
+    }
+
+    /// Whether a ray that leaves towards `wi` goes through the surface.
+    pub fn is_beyond(&self, wi: Vec3) -> bool {
+        self.reflection.transmits() && !self.reflection.is_above(wi)
     }
 }

@@ -10,7 +10,7 @@
 //! away from `wo` is bent back until `wo` is above its horizon. It is not bent past the cosine between
 //! `wo` and the triangle's normal: a flat surface is never bent, however grazing `wo` is.
 
-use super::bsdf::{ALPHA_MIN, Bsdf, SurfaceSample};
+use super::bsdf::{ALPHA_MIN, Bsdf, Passage, SurfaceSample};
 use super::rays::{Anchor, Hit, HitSurface};
 use crate::math::color::Rgb;
 use crate::math::directions::mirrors;
@@ -22,10 +22,14 @@ use std::ops::{Add, Mul};
 /// The smallest cosine between `wo` and a shading normal that is not the triangle's own.
 const LEAST_COSINE: f32 = 1e-3;
 
+/// Solid glass bends light at least like this: without any bend, directions of 32 bits could not tell a lobe.
+const LEAST_IOR: f32 = 1.001;
+
 /// Whether a material is a pane: thin glass, so smooth that light passes it straight. Its GGX alpha is at most
 /// [`ALPHA_MIN`] everywhere, which is that of a roughness of 0.0316.
 pub fn is_pane(material: &Material) -> bool {
-    material.transmission.is_some() && material.roughness * material.roughness <= ALPHA_MIN
+    let is_thin = material.transmission.is_some_and(|passes| passes.volume.is_none());
+    is_thin && material.roughness * material.roughness <= ALPHA_MIN
 }
 
 /// Looks up what is at a hit, for one pose of a scene.
@@ -34,6 +38,8 @@ pub struct Surfaces<'a> {
     scene: &'a Scene,
     pose: &'a Pose,
     plain: Material,
+    /// Whether any glass is solid.
+    has_volumes: bool,
 }
 
 /// A point that light arrives at and leaves from.
@@ -67,7 +73,11 @@ struct At<'a> {
 impl<'a> Surfaces<'a> {
     /// The surfaces of a scene as it stands in `pose`.
     pub fn new(scene: &'a Scene, pose: &'a Pose) -> Surfaces<'a> {
-        Surfaces { scene, pose, plain: Material::default() }
+        let is_solid = |material: &Material| {
+            material.transmission.is_some_and(|passes| passes.volume.is_some())
+        };
+        let has_volumes = scene.materials.iter().any(is_solid);
+        Surfaces { scene, pose, plain: Material::default(), has_volumes }
     }
 
     /// The share of light that a point blocks, in `[0, 1]`: its opacity in a blended material, 0 or 1 in
@@ -102,7 +112,22 @@ impl<'a> Surfaces<'a> {
         let least = anchor.normal.dot(wo).abs().min(LEAST_COSINE);
         let normal = toward(if front { normal } else { -normal }, wo, least);
         let frame = Frame::around(normal);
-        Surface { anchor, front, frame, sample: self.evaluate(&at, material) }
+        let mut sample = self.evaluate(&at, material);
+        if let Passage::Solid(ior) = sample.passage {
+            sample.passage = Passage::Solid(if front { ior } else { 1.0 / ior });
+        }
+        Surface { anchor, front, frame, sample }
+    }
+
+    /// What is behind the surface of solid glass: its absorption, 1/m. `None` if it is none.
+    #[inline]
+    pub fn volume(&self, instance: u32) -> Option<Rgb> {
+        if !(built_in::TRANSMISSION && self.has_volumes) {
+            return None;
+        }
+        let mesh = &self.scene.meshes[self.scene.instances[instance as usize].mesh as usize];
+        let material = &self.scene.materials[mesh.material? as usize];
+        Some(material.transmission?.volume?.absorption)
     }
 
     /// The share of light that a pane lets through along a unit direction, either way; none if the hit is on something
@@ -153,11 +178,16 @@ impl<'a> Surfaces<'a> {
                 coat.roughness * self.lookup(at, &coat.roughness_texture).y,
             ),
         };
-        let transmission = match &material.transmission {
-            Some(passes) if built_in::TRANSMISSION && is_pane(material) => {
-                passes.factor * self.lookup(at, &passes.factor_texture).x
+        let (transmission, passage) = match &material.transmission {
+            Some(passes) if built_in::TRANSMISSION => {
+                let passage = match passes.volume {
+                    Some(_) => Passage::Solid(material.ior.max(LEAST_IOR)),
+                    None if is_pane(material) => Passage::Straight,
+                    None => Passage::Thin,
+                };
+                (passes.factor * self.lookup(at, &passes.factor_texture).x, passage)
             }
-            _ => 0.0,
+            _ => (0.0, Passage::Straight),
         };
         SurfaceSample {
             base_color: material.base_color * base.truncate(),
@@ -168,6 +198,7 @@ impl<'a> Surfaces<'a> {
             coat,
             coat_roughness,
             transmission,
+            passage,
         }
     }
 

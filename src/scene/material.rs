@@ -69,6 +69,15 @@ pub struct Transmission {
     pub factor: f32,
     /// Linear texture: red multiplies the factor.
     pub factor_texture: Option<TextureUse>,
+    /// What the surface encloses; `None` is a wall without thickness, which bends no light.
+    pub volume: Option<Volume>,
+}
+
+/// What solid glass is filled with (`KHR_materials_volume`). Its index of refraction is the material's.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Volume {
+    /// Absorption coefficient, 1/m.
+    pub absorption: Rgb,
 }
 
 /// What coverage means.

@@ -32,6 +32,7 @@ fn surface() -> impl Strategy<Value = (Bsdf, Glossy)> {
                 coat,
                 coat_roughness,
                 transmission: 0.0,
+                passage: Default::default(),
             };
             let bsdf = Bsdf::new(&sample, Frame::around(any.receiver.normal));
             let lobes = bsdf.toward(any.to_eye).lobes()?;
@@ -95,6 +96,7 @@ fn a_reflection_is_found() {
         coat: 0.0,
         coat_roughness: 0.0,
         transmission: 0.0,
+        passage: Default::default(),
     };
     let paint = SurfaceSample { roughness: 0.6, coat: 1.0, coat_roughness: 0.15, ..stone };
     for sample in [stone, paint] {

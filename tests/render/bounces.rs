@@ -35,7 +35,7 @@ fn white_things() -> Vec<(String, Material, [f64; 2])> {
         things.push((format!("coat of roughness {roughness}"), thing, [4e-3, 3e-2]));
     }
     for factor in [1.0, 0.5] {
-        let transmission = Some(Transmission { factor, factor_texture: None });
+        let transmission = Some(Transmission { factor, factor_texture: None, volume: None });
         let glass = Material { roughness: 0.0, transmission, ..Default::default() };
         things.push((format!("a pane of {factor}"), glass.clone(), [4e-3, 3e-2]));
         let coated = Material { coat: coat(1.0, 0.2), ..glass };

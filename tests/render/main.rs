@@ -10,6 +10,7 @@ mod far;
 mod fitted;
 mod fog;
 mod forced;
+mod glass;
 mod knobs;
 mod layers;
 mod learned;

@@ -264,7 +264,9 @@ impl<'a> Drawing<'a> {
         };
         // What the camera does not see is in the way of no view.
         let is_opaque = sample.is_visible
-            && material.is_none_or(|material| material.alpha_mode == AlphaMode::Opaque);
+            && material.is_none_or(|material| {
+                material.alpha_mode == AlphaMode::Opaque && material.transmission.is_none()
+            });
         let is_coarse = 0.5 * across.length() >= share_m2;
         // A square that stands for much of a ground must not cut through what stands on it.
         let is_rough = || {

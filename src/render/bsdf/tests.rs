@@ -1,6 +1,8 @@
 //! Laws: energy, densities, limits. The Monte Carlo here is a fixed Hammersley set, so a failure
 //! is a failure every time.
 
+mod glass;
+
 use super::*;
 use std::f32::consts::{PI, TAU};
 
@@ -23,6 +25,7 @@ fn dielectric(base: f32, roughness: f32) -> SurfaceSample {
         coat: 0.0,
         coat_roughness: 0.0,
         transmission: 0.0,
+        passage: Default::default(),
     }
 }
 
@@ -208,6 +211,7 @@ fn the_horizon_and_the_mirror_stay_finite() {
         coat: f32::INFINITY,
         coat_roughness: -1.0,
         transmission: f32::NAN,
+        passage: Default::default(),
     };
     let mirrors = coated(metal(1.0, 0.0), 1.0, 0.0);
     for sample in [wild, mirrors, metal(1.0, 0.0), dielectric(1.0, 0.0), dielectric(0.0, 1.0)] {
