@@ -26,14 +26,6 @@ pub(super) struct Drawn {
 }
 
 impl Integrator<'_> {
-    /// The vertex at a hit of a path that came through something.
-    fn vertex_within(&self, inside: Inside, hit: &Hit, wo: Vec3) -> Option<Vertex> {
-        let vertex = self.vertex(hit, wo)?;
-        // A wall without thickness has the same on both sides.
-        let beyond = if vertex.here == vertex.beyond { inside } else { vertex.beyond };
-        Some(Vertex { here: inside, beyond, ..vertex })
-    }
-
     /// Tints the panes that a ray passes.
     pub(super) fn tint_panes(&self, passed: &mut Passed, direction: Vec3) {
         for pane in &mut passed.panes {

@@ -6,7 +6,6 @@
 //! how often it would have been picked from the point before. In [fog](super::fog), every stretch of a
 //! path also gathers the light scattered along it.
 
-use super::bsdf::Reflection;
 use super::camera::{CameraRay, CameraRays};
 use super::direct::{FoundByReflection, power_heuristic};
 use super::fog::Fog;
@@ -15,17 +14,19 @@ use super::light_groups::LightGroups;
 use super::links::FrameLinks;
 use super::panes::Drawn;
 use super::picker::{LightPicker, PickScratch, Site, Wanted};
-use super::rays::{Anchor, Hit, HitSurface, Passed, Seen, Sender, Tracer};
+use super::rays::{Hit, HitSurface, Passed, Seen, Sender, Tracer};
 use super::settings::RenderSettings;
 use super::surface::Surfaces;
 use crate::emitter::{EmitterHit, InfiniteLight, PosedEmitters};
 use crate::light_tree::learned::Cells;
-use crate::light_tree::{Cell, Glossy, Lobes, Picked, Receiver, ReceiverClass, Splitting};
+use crate::light_tree::{Cell, Picked, Receiver, Splitting};
 use crate::math::built_in;
 use crate::math::color::Rgb;
 use crate::math::random::{Sampler, hash};
 use crate::scene::Visibility;
 use glam::{Vec2, Vec3};
+
+pub use super::vertex::{Inside, Vertex};
 
 /// Bounces before Russian roulette may end a path.
 const SURE_BOUNCES: u32 = 3;
@@ -118,28 +119,6 @@ struct Origin {
     point: Vec3,
     normal: Vec3,
     bsdf_pdf: f32,
-}
-
-/// What a stretch of a path goes through: solid glass of some absorption, 1/m, or what fills the space.
-pub type Inside = Option<Rgb>;
-
-/// A point on the way, about to be lit.
-#[derive(Clone, Copy)]
-pub struct Vertex {
-    /// Where it is.
-    pub anchor: Anchor,
-    /// How it reflects.
-    pub reflection: Reflection,
-    /// Towards the point before it, unit, world space.
-    pub wo: Vec3,
-    /// What the tree is asked for. It has no normal where light from either side is wanted.
-    pub receiver: Receiver,
-    /// What is on this side.
-    pub here: Inside,
-    /// What is on the other.
-    pub beyond: Inside,
-    /// Which lights light it.
-    pub class: ReceiverClass,
 }
 
 /// A thread's buffers, reused from path to path.
@@ -296,27 +275,6 @@ impl Integrator<'_> {
         }
     }
 
-    /// The vertex at a hit; `None` on a sphere light, which reflects nothing.
-    pub(super) fn vertex(&self, hit: &Hit, wo: Vec3) -> Option<Vertex> {
-        let HitSurface::Triangle { instance, triangle, barycentric } = hit.surface else {
-            return None;
-        };
-        let surface = self.surfaces.at(instance, triangle, barycentric, hit.anchor, wo);
-        let reflection = surface.bsdf().toward(wo);
-        let normal = if reflection.transmits() { Vec3::ZERO } else { surface.frame.normal };
-        let receiver = Receiver { point: hit.anchor.position, normal };
-        let class = self.links.map_or(ReceiverClass::ALL, |links| links.of_instance(instance));
-        let [here, beyond] = self.sides(hit, wo);
-        Some(Vertex { anchor: hit.anchor, reflection, wo, receiver, here, beyond, class })
-    }
-
-    /// What is on the side of `wo` of a surface, and what on the other. Only solid glass knows.
-    fn sides(&self, hit: &Hit, wo: Vec3) -> [Inside; 2] {
-        let HitSurface::Triangle { instance, .. } = hit.surface else { return [None; 2] };
-        let volume = self.surfaces.volume(instance);
-        if hit.anchor.normal.dot(wo) >= 0.0 { [None, volume] } else { [volume, None] }
-    }
-
     /// What lights are picked for at a vertex.
     fn wanted(&self, vertex: &Vertex, sampler: &mut Sampler, salt: u32) -> Wanted {
         let wanted = match self.picker.looks() {
@@ -457,48 +415,5 @@ impl Integrator<'_> {
         let Origin { wanted, how, bsdf_pdf, .. } = before;
         let expected = self.picker.expected(wanted, how, light, &mut scratch.picks) as f32;
         power_heuristic(*bsdf_pdf, expected * pdf())
-    }
-}
-
-impl Vertex {
-    /// What lights are picked for here. The BSDF is part of it only if it has a specular lobe. With a
-    /// sampler, a direction is sampled from the BSDF.
-    pub fn wanted(&self, sampler: Option<&mut Sampler>) -> Wanted {
-        let receiver = self.receiver;
-        let is_glossy =
-            |lobes: &Lobes| built_in::GLOSSY && lobes.at_normal + lobes.toward_grazing > 0.0;
-        // Where light passes, lights on both sides are wanted: a site without a horizon.
-        let lobes = self.reflection.lobes().filter(|_| !self.reflection.transmits());
-        let Some(lobes) = lobes.filter(is_glossy) else {
-            return self.wanted_at(Site::At(receiver));
-        };
-        // Independent of the direction in which the path continues: that one may hit a light, whose
-        // weight must not depend on the direction.
-        let drawn = sampler.and_then(|sampler| {
-            let [lobe, u, v, _] = sampler.next_4d();
-            self.reflection.sample(lobe, Vec2::new(u, v))
-        });
-        let toward = drawn.map_or(receiver.normal, |sample| sample.wi);
-        let glossy = Glossy { receiver, to_eye: self.wo, lobes, toward };
-        self.wanted_at(Site::Glossy(glossy))
-    }
-
-    fn wanted_at(&self, site: Site) -> Wanted {
-        Wanted { site, cell: Cell::NONE, class: self.class }
-    }
-
-    /// Whether `wi` is on the same side as `wo` of the geometric surface, and not only of the shading
-    /// normal; where light passes, whether it is on the same side of both.
-    pub fn lets_through(&self, wi: Vec3) -> bool {
-        let is_same_side = self.anchor.normal.dot(wi) * self.anchor.normal.dot(self.wo) > 0.0;
-        if self.reflection.transmits() {
-            return is_same_side == self.reflection.is_above(wi);
-        }
-        is_same_side
-    }
-
-    /// Whether a ray that leaves towards `wi` goes through the surface.
-    pub fn is_beyond(&self, wi: Vec3) -> bool {
-        self.reflection.transmits() && !self.reflection.is_above(wi)
     }
 }
