@@ -8,6 +8,7 @@ use candelabra::light_tree::NoSuchFrame;
 use candelabra::light_tree::learned::{BESIDE, Plane, Table, ViewKeys};
 use candelabra::light_tree::{Veil, WIDTH};
 use candelabra::math::random::hash;
+use candelabra::pipeline;
 use candelabra::render::buffers::RenderBuffers;
 use candelabra::render::{RenderDelegate, RenderSettings};
 use candelabra::scene::{LightKind, Material};
@@ -89,6 +90,19 @@ fn what_is_behind_a_pane_is_not_learned_to_be_hidden() {
         lesson(&stage.set(), 4, 1 << 14).hidden
     };
     assert!(hidden(filter([0.1, 0.9, 0.2])) < 1e-2 && hidden(lambert([0.1, 0.9, 0.2])) > 0.3);
+}
+
+/// A table is out of date where a sheet of glass became opaque, but not where its tint changed.
+#[test]
+fn the_key_of_geometry_knows_panes() {
+    let key = |sheet: Material| {
+        let mut stage = walled();
+        stage.scene.materials[1] = sheet;
+        pipeline::view_keys(&stage.scene, &stage.scene.cameras[0]).geometry
+    };
+    let [red, blue, opaque] =
+        [filter([0.9, 0.1, 0.2]), filter([0.1, 0.1, 0.9]), lambert([0.9, 0.1, 0.2])].map(key);
+    assert!(red == blue && red != opaque);
 }
 
 #[test]

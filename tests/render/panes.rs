@@ -7,7 +7,9 @@ use crate::statistics::{assert_even, pixels};
 use crate::strategies::{Way, assert_agreement, every_way};
 use candelabra::render::buffers::RenderBuffers;
 use candelabra::render::{Aov, LightStrategy, RenderSettings};
-use candelabra::scene::{AlphaMode, FogBox, LightKind, Material, Medium, Visibility};
+use candelabra::scene::{
+    AlphaMode, Channel, FogBox, Interpolation, Keys, LightKind, Material, Medium, Visibility,
+};
 use glam::{DVec3, Vec3};
 
 /// A plaster floor and a plate of metal below lamps of every kind, seen from near the floor.
@@ -81,6 +83,43 @@ fn lamps_behind_a_pane_are_tinted_and_nothing_else() {
             let what = format!("{way:?}, mis {mis}, scale {scale}");
             assert_tinted(&what, &covered, &clear, tint);
             assert_tinted(&format!("{what}, two"), &twice, &clear, tint * tint);
+        }
+    }
+}
+
+/// A pane that slides along itself, blurred, is one that stands.
+#[test]
+fn a_moving_pane_tints_as_one_that_stands() {
+    let tint = Vec3::new(0.5, 0.25, 0.75);
+    let mut moving = lit_floor(1.0);
+    let node = moving.quad([1e3; 2], filter(tint), lid(1.0)).node;
+    let path = [0.0, 1.0].map(|x| Vec3::new(x, 0.45, 0.0)).to_vec();
+    let times_s = vec![0.0, 1.0];
+    let keys = Keys { times_s, values: path, interpolation: Interpolation::Linear };
+    moving.scene.nodes[node as usize].channels = vec![Channel::Translation(keys)];
+    for mis in [false, true] {
+        let settings = RenderSettings { mis, ..direct(8, 8) };
+        let clear = lit_floor(1.0).render(&settings);
+        assert_tinted("a sliding pane", &moving.render(&settings), &clear, tint);
+    }
+}
+
+/// A pane in the place of a lamp does not cover it, whichever way the lamp is found.
+#[test]
+fn a_pane_flush_with_a_lamp_does_not_tint_it() {
+    for scale in [1e-3, 1.0, 1e3] {
+        let picture = |is_covered: bool, mis: bool| {
+            let mut stage = lit_floor(scale);
+            stage.scene.lights.clear();
+            if is_covered {
+                let place = facing(DVec3::new(-0.4, 1.0, 0.2) * scale, DVec3::ZERO);
+                stage.quad([0.9 * scale as f32; 2], filter(Vec3::splat(0.5)), place);
+            }
+            stage.render(&RenderSettings { mis, ..direct(8, 8) })
+        };
+        for mis in [false, true] {
+            let what = format!("scale {scale}, mis {mis}");
+            assert_tinted(&what, &picture(true, mis), &picture(false, mis), Vec3::ONE);
         }
     }
 }
