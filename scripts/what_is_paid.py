@@ -34,7 +34,7 @@ import time
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
-FEATURES = ("textures", "fog", "motion", "domes", "instances", "splitting", "range", "glossy")
+FEATURES = ("textures", "fog", "motion", "domes", "instances", "splitting", "range", "glossy", "transmission")
 ALL = "all"
 ALLOWED = 1.02
 FLOOR, FACES, POINTS = 48, 3000, 1000

@@ -104,6 +104,8 @@ def _transmitted(inputs: Inputs, names: tuple[str, str, str, str], base: Quantit
         return base
     read["transmission"], read["thinWalled"] = amount, inputs.get(thin)
     distance, tint = inputs.get(depth), inputs.get(color).wide(3)
+    if not _zero(read["thinWalled"]):
+        distance = _ZERO  # a wall without an inside is tinted as a whole
     if not (distance.is_constant and tint.is_constant) and not _zero(distance):
         inputs.changed(color, "glTF's attenuation is constant; the tint is put on the surface")
         distance = _ZERO

@@ -176,6 +176,11 @@ fn surfaces(scene: &Scene, needs: &Requirements, emitters: &Emitters) -> Vec<Fea
             .with("their lobes are part of the importance"),
         Feature::new("clear coats", needs.coats)
             .with("the brighter peak, its or that of what is below, is part of the importance"),
+        Feature::new("glass", needs.glass).used_by(
+            needs.glass - needs.solid_glass,
+            "thin; rays to lights pass it where it is smooth",
+            "solid: rays to lights do not pass it",
+        ),
         Feature::new("meshes shared by instances", needs.shared_meshes).used_by(
             kept_shared,
             "of those that are large, rays search one set of triangles in its own space",

@@ -243,5 +243,5 @@ fn is_seen(
 ) -> Option<bool> {
     let incoming = integrator.incoming(light, vertex.receiver.point, vertex.receiver.normal, u)?;
     let counts = vertex.lets_through(incoming.direction);
-    counts.then(|| integrator.arriving(&vertex.anchor, &incoming, accept).max_element() > 0.0)
+    counts.then(|| integrator.arriving(vertex, &incoming, accept).max_element() > 0.0)
 }

@@ -87,8 +87,8 @@ pub(super) use sees_as;
 pub struct Receiver {
     /// World space, metres.
     pub point: Vec3,
-    /// Unit shading normal, on the side that is lit, world space. Zero for a point in a medium, where
-    /// light from every direction counts.
+    /// Unit shading normal, on the side that is lit, world space. Zero for a point in a medium or
+    /// of glass, where light from every direction counts.
     pub normal: Vec3,
 }
 

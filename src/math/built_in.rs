@@ -20,3 +20,5 @@ pub const SPLITTING: bool = !cfg!(feature = "without-splitting");
 pub const RANGE: bool = !cfg!(feature = "without-range");
 /// The specular lobe.
 pub const GLOSSY: bool = !cfg!(feature = "without-glossy");
+/// Light that passes through glass.
+pub const TRANSMISSION: bool = !cfg!(feature = "without-transmission");

@@ -144,7 +144,7 @@ fn contribution(
     }
     if visibility && sum.luminance > 0.0 {
         let accept = integrator.cutouts(0);
-        let arriving = middle.map(|found| integrator.arriving(&vertex.anchor, &found, &accept));
+        let arriving = middle.map(|found| integrator.arriving(vertex, &found, &accept));
         sum.luminance *= arriving.map_or(0.0, luminance);
     }
     sum

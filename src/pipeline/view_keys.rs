@@ -5,6 +5,7 @@
 //! where.
 
 use crate::light_tree::learned::ViewKeys;
+use crate::render::surface::is_pane;
 use crate::scene::{
     AlphaMode, Camera, Channel, Instance, Keys, LightKind, Links, Membership, Mesh, Pose, Scene,
 };
@@ -137,6 +138,9 @@ fn shape(scene: &Scene, mesh: &Mesh) -> Key {
             let opacities: Vec<u8> = texture.opacities().collect();
             hasher.update_rayon(&opacities);
         }
+    }
+    if material.is_some_and(is_pane) {
+        hasher.update(b"pane");
     }
     finish(&hasher)
 }

@@ -1,10 +1,9 @@
 //! Next-event estimation: light from the lights that are picked for a point of a surface.
 
-use super::path::{Integrator, PathScratch, TraceStats, Vertex};
+use super::path::{Inside, Integrator, PathScratch, TraceStats, Vertex};
 use super::picker::{LightPick, PickScratch, Wanted};
-use super::rays::{Anchor, Caster};
+use super::rays::{Anchor, Caster, Hit};
 use crate::light_tree::{Picked, Splitting};
-use crate::math::built_in;
 use crate::math::color::{Rgb, luminance};
 use crate::math::random::hash;
 use glam::{Vec2, Vec3};
@@ -109,7 +108,7 @@ impl Integrator<'_> {
             }
             stats.rays += 1;
             stats.shadow_rays += 1;
-            visit(pick.light, reflected, self.arriving(&vertex.anchor, &incoming, accept));
+            visit(pick.light, reflected, self.arriving(vertex, &incoming, accept));
         });
         stats.groups += picks.weighed() - weighed;
     }
@@ -178,9 +177,22 @@ impl Integrator<'_> {
     }
 
     /// The share of the light that reaches a point: zero if anything blocks it, else the transmittance of
-    /// the fog.
+    /// the fog or glass and of the panes on the way.
     pub fn arriving(
         &self,
+        vertex: &Vertex,
+        incoming: &Incoming,
+        accept: &impl Fn(u32, u32, Vec2) -> bool,
+    ) -> Rgb {
+        let is_beyond = vertex.is_beyond(incoming.direction);
+        let inside = if is_beyond { vertex.beyond } else { vertex.here };
+        self.arriving_within(inside, &vertex.anchor, incoming, accept)
+    }
+
+    /// The same at a point that is inside of something.
+    pub(super) fn arriving_within(
+        &self,
+        inside: Inside,
         at: &Anchor,
         incoming: &Incoming,
         accept: &impl Fn(u32, u32, Vec2) -> bool,
@@ -190,33 +202,33 @@ impl Integrator<'_> {
             Some(light) => (light.position - at.position).length(),
             None => f32::INFINITY,
         };
-        let blocked = match self.links.zip(incoming.shadow_set) {
-            None => self.is_blocked(at, incoming, accept, &|_| true),
+        let share = match self.links.zip(incoming.shadow_set) {
+            None => self.unblocked(at, incoming, accept, &|_| true),
             Some((links, set)) => {
-                self.is_blocked(at, incoming, accept, &|caster| links.casts(set, caster))
+                self.unblocked(at, incoming, accept, &|caster| links.casts(set, caster))
             }
         };
-        if blocked {
+        if share == Rgb::ZERO {
             return Rgb::ZERO;
         }
-        let through = |fog: &super::fog::Fog| fog.transmittance(at.position, direction, length);
-        self.fog.as_ref().filter(|_| built_in::FOG).map_or(Rgb::ONE, through)
+        share * self.through(inside, at.position, direction, length)
     }
 
-    /// Whether any prim that `casts` names is between a point and a light.
-    fn is_blocked(
+    /// The share of light that the prims that `casts` names let through between a point and a light.
+    fn unblocked(
         &self,
         at: &Anchor,
         incoming: &Incoming,
         accept: &impl Fn(u32, u32, Vec2) -> bool,
         casts: &impl Fn(Caster) -> bool,
-    ) -> bool {
+    ) -> Rgb {
         let direction = incoming.direction;
+        let tint = |pane: &Hit| self.surfaces.tint(pane, direction);
         match &incoming.from {
-            Some(light) => self.tracer.occluded_between_by(at, light, accept, casts),
+            Some(light) => self.tracer.transmitted_between(at, light, accept, casts, &tint),
             None => {
-                let origin = at.origin_toward(direction);
-                self.tracer.occluded_by(origin, direction, f32::INFINITY, accept, casts)
+                let ray = (at.origin_toward(direction), direction, f32::INFINITY);
+                self.tracer.transmitted(ray, accept, casts, &tint)
             }
         }
     }

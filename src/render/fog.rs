@@ -16,7 +16,7 @@
 use super::direct::another;
 use super::path::{Integrator, PathScratch, TraceStats};
 use super::picker::{PickScratch, Site, Wanted};
-use super::rays::Anchor;
+use super::rays::{Anchor, Passed};
 use crate::light_tree::{Cell, Picked, ReceiverClass, Segment, Splitting};
 use crate::math::color::{Rgb, luminance};
 use crate::scene::{Camera, Medium, Pose, Scene};
@@ -169,11 +169,11 @@ impl Integrator<'_> {
         Some(Drawn { t: from + drawn.t, ..drawn })
     }
 
-    /// Light that the fog along a stretch of a ray scatters, once, towards the ray's origin. `throughput`
-    /// is the share of it that gets to the eye: the result is without it.
+    /// Light that the fog along a stretch of a ray scatters, once, towards the ray's origin, through the panes that the
+    /// ray passes. `throughput` is the share of it that gets to the eye: the result is without it.
     pub(super) fn scattered(
         &self,
-        fog: &Fog,
+        (fog, passed): (&Fog, &Passed),
         (origin, direction, length): (Vec3, Vec3, f32),
         numbers: ([f32; 4], u32),
         accept: &impl Fn(u32, u32, Vec2) -> bool,
@@ -193,7 +193,8 @@ impl Integrator<'_> {
         let mut sum = Rgb::ZERO;
         let PathScratch { picks, stats, by_group, blocked, trial, .. } = scratch;
         let how = self.picker.splitting(bounce);
-        let part = (fog, &stretch);
+        let through = |t: f64| passed.tint((part.0 + t) as f32);
+        let part = (fog, &stretch, &through);
         self.gather_along(
             part,
             (&wanted, how),
@@ -223,10 +224,10 @@ impl Integrator<'_> {
     }
 
     /// Picks lights for a stretch inside the fog and calls `visit` with each, what is scattered of
-    /// it if nothing blocks it, and the share that arrives.
+    /// it if nothing blocks it, and the share that arrives. `through` is what panes let through from a point of it.
     fn gather_along(
         &self,
-        (fog, stretch): (&Fog, &Stretch),
+        (fog, stretch, through): (&Fog, &Stretch, &impl Fn(f64) -> Rgb),
         (wanted, how): (&Wanted, &Splitting),
         ([u_pick, u_place, lu, lv], salt): ([f32; 4], u32),
         accept: &impl Fn(u32, u32, Vec2) -> bool,
@@ -250,11 +251,11 @@ impl Integrator<'_> {
             let Some(incoming) = self.incoming(pick.light, point, Vec3::ZERO, u) else { return };
             stats.rays += 1;
             stats.shadow_rays += 1;
-            let arriving = self.arriving(&Anchor::free(point), &incoming, accept);
+            let arriving = self.arriving_within(None, &Anchor::free(point), &incoming, accept);
             let turned = f64::from(fog.phase(incoming.direction, direction));
             let density = pick.probability * pdf * f64::from(incoming.pdf.unwrap_or(1.0));
             let weight = (turned / density) as f32;
-            let whole = fog.scattering * fog.through(t) * incoming.radiance * weight;
+            let whole = fog.scattering * fog.through(t) * incoming.radiance * weight * through(t);
             visit(pick.light, whole, arriving);
         });
         stats.groups += picks.weighed() - weighed;

@@ -8,8 +8,9 @@
 //! |---|---|
 //! | [`delegate`] | what is done once for a shot, and what for each frame? |
 //! | `frame_times` | when does the camera see a frame? |
-//! | [`path`], `walk` | how does light get from a lamp to the eye, and where are its vertices? |
+//! | [`path`], `vertex`, `walk` | how does light get from a lamp to the eye, and where are its vertices? |
 //! | [`direct`], [`fog`] | what do picked lights give a surface, what a stretch of fog? |
+//! | `panes` | what becomes of a path that meets thin glass? |
 //! | [`links`] | which lights light a surface, and what casts their shadows? |
 //! | `far_field` | what do lights with a photometric profile tell the tree? |
 //! | [`picker`] | which lights are sampled there, and how often is each expected to be? |
@@ -49,6 +50,7 @@ pub mod light_groups;
 pub mod links;
 mod motion;
 pub mod noise;
+mod panes;
 mod parts;
 pub mod passes;
 pub mod path;
@@ -58,6 +60,7 @@ pub mod png;
 pub mod rays;
 pub mod settings;
 pub mod surface;
+mod vertex;
 mod walk;
 
 pub use crop::{CropError, Window};

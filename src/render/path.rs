@@ -6,25 +6,27 @@
 //! how often it would have been picked from the point before. In [fog](super::fog), every stretch of a
 //! path also gathers the light scattered along it.
 
-use super::bsdf::Reflection;
 use super::camera::{CameraRay, CameraRays};
 use super::direct::{FoundByReflection, power_heuristic};
 use super::fog::Fog;
 use super::knob::Trial;
 use super::light_groups::LightGroups;
 use super::links::FrameLinks;
+use super::panes::Drawn;
 use super::picker::{LightPicker, PickScratch, Site, Wanted};
-use super::rays::{Anchor, Hit, HitSurface, Seen, SeenLight, Sender, Tracer};
+use super::rays::{Hit, HitSurface, Passed, Seen, Sender, Tracer};
 use super::settings::RenderSettings;
 use super::surface::Surfaces;
 use crate::emitter::{EmitterHit, InfiniteLight, PosedEmitters};
 use crate::light_tree::learned::Cells;
-use crate::light_tree::{Cell, Glossy, Lobes, Picked, Receiver, ReceiverClass, Splitting};
+use crate::light_tree::{Cell, Picked, Receiver, Splitting};
 use crate::math::built_in;
 use crate::math::color::Rgb;
 use crate::math::random::{Sampler, hash};
 use crate::scene::Visibility;
 use glam::{Vec2, Vec3};
+
+pub use super::vertex::{Inside, Vertex};
 
 /// Bounces before Russian roulette may end a path.
 const SURE_BOUNCES: u32 = 3;
@@ -119,26 +121,11 @@ struct Origin {
     bsdf_pdf: f32,
 }
 
-/// A point on the way, about to be lit.
-#[derive(Clone, Copy)]
-pub struct Vertex {
-    /// Where it is.
-    pub anchor: Anchor,
-    /// How it reflects.
-    pub reflection: Reflection,
-    /// Towards the point before it, unit, world space.
-    pub wo: Vec3,
-    /// What the tree is asked for.
-    pub receiver: Receiver,
-    /// Which lights light it.
-    pub class: ReceiverClass,
-}
-
 /// A thread's buffers, reused from path to path.
 #[derive(Debug, Default)]
 pub struct PathScratch {
     pub(super) picks: PickScratch,
-    lights: Vec<SeenLight>,
+    passed: Passed,
     /// Light of the last path towards the eye by light group, nits; empty unless that is asked for.
     pub by_group: Vec<Rgb>,
     /// Sum of the squared luminance of what the last path would have got from lights that were picked
@@ -172,15 +159,27 @@ impl Integrator<'_> {
         scratch.by_group.resize(self.groups.map_or(0, |groups| groups.names().len()), Rgb::ZERO);
         let mut throughput = Rgb::ONE;
         let mut before: Option<Origin> = None;
+        let mut inside: Inside = None;
         for bounce in 0..=self.settings.depth {
             scratch.stats.rays += 1;
             let sender = if bounce == 0 { Sender::Camera } else { Sender::Surface };
-            let mut lights = std::mem::take(&mut scratch.lights);
+            let mut passed = std::mem::take(&mut scratch.passed);
             let ray = (origin, direction, reach_m);
-            let Seen { hit, in_shade } = self.tracer.look(sender, ray, &accept, &mut lights);
+            let Seen { hit, in_shade } = self.tracer.look(sender, ray, &accept, &mut passed);
             reach_m = f32::INFINITY;
+            if built_in::TRANSMISSION
+                && bounce == 0
+                && let Some(hit) = &hit
+            {
+                inside = self.sides(hit, -direction)[0];
+            }
+            let meets_panes = built_in::TRANSMISSION && !passed.panes.is_empty();
+            if meets_panes {
+                self.tint_panes(&mut passed, direction);
+            }
             if built_in::FOG
                 && let Some(fog) = &self.fog
+                && inside.is_none()
             {
                 let length = hit.as_ref().map_or(f32::INFINITY, |hit| hit.t);
                 if bounce < self.settings.depth {
@@ -188,36 +187,45 @@ impl Integrator<'_> {
                     let stretch = (origin, direction, length);
                     let numbers = (numbers, salt);
                     let at = (bounce, throughput);
-                    let light = self.scattered(fog, stretch, numbers, &accept, at, scratch);
+                    let light =
+                        self.scattered((fog, &passed), stretch, numbers, &accept, at, scratch);
                     seen.add(bounce + 1, throughput * light);
                 }
             }
-            for SeenLight { hit, .. } in &lights {
-                let arriving = throughput * self.through_fog(origin, direction, hit.t);
-                seen.add(bounce, self.emitted(hit, direction, &before, arriving, scratch));
+            for light in &passed.lights {
+                let arriving = throughput * self.through(inside, origin, direction, light.hit.t);
+                let arriving = arriving * passed.tint_of(light);
+                seen.add(bounce, self.emitted(&light.hit, direction, &before, arriving, scratch));
             }
-            scratch.lights = lights;
-            let length = hit.as_ref().map_or(f32::INFINITY, |hit| hit.t);
-            throughput *= self.through_fog(origin, direction, length);
-            let Some(hit) = hit else {
-                if !in_shade {
-                    let light = self.emitted_at_infinity(direction, &before, throughput, scratch);
-                    seen.add(bounce, throughput * light);
+            if hit.is_none() && !in_shade {
+                let arriving = self.through(inside, origin, direction, f32::INFINITY);
+                let arriving = throughput * arriving * passed.tint_of_sky();
+                let light = self.emitted_at_infinity(direction, &before, arriving, scratch);
+                seen.add(bounce, arriving * light);
+            }
+            let first = passed.met().next().map_or(hit, |pane| Some(pane.hit));
+            let drawn = match (meets_panes, hit) {
+                (false, None) => Drawn::default(),
+                (false, Some(hit)) => self.at_end((origin, direction), inside, &hit),
+                (true, _) => {
+                    let [u, ..] = sampler.next_4d();
+                    self.through_panes((origin, direction), inside, &passed, hit, u)
                 }
-                break;
             };
-            let wo = -direction;
-            let vertex = self.vertex(&hit, wo);
-            if bounce == 0 {
+            scratch.passed = passed;
+            if let Some(hit) = first.filter(|_| bounce == 0) {
+                // Of a pane, not of what is seen through it; but the albedo is of both.
+                let own = if meets_panes { self.vertex(&hit, -direction) } else { drawn.vertex };
                 seen.hit = Some(hit);
                 seen.depth_m = self.camera.depth_m(hit.anchor.position);
-                seen.normal = vertex.as_ref().map_or(hit.anchor.normal, |v| v.receiver.normal);
-                seen.albedo = vertex.as_ref().map_or(Rgb::ZERO, |v| {
-                    let (specular, diffuse) = v.reflection.albedo();
-                    specular + diffuse
-                });
+                seen.normal = own.map_or(hit.anchor.normal, |v| v.reflection.normal());
+                seen.albedo = match meets_panes {
+                    true => drawn.albedo,
+                    false => own.map_or(Rgb::ZERO, |v| v.reflection.whole_albedo()),
+                };
             }
-            let Some(vertex) = vertex.filter(|_| bounce < self.settings.depth) else { break };
+            throughput *= drawn.weight;
+            let Some(vertex) = drawn.vertex.filter(|_| bounce < self.settings.depth) else { break };
 
             let wanted = self.wanted(&vertex, &mut sampler, hash(seed, bounce));
             let [pick, lu, lv, roulette] = sampler.next_4d();
@@ -248,6 +256,9 @@ impl Integrator<'_> {
             before = Some(Origin { wanted, how, point, normal, bsdf_pdf: next.pdf });
             origin = vertex.anchor.origin_toward(next.wi);
             direction = next.wi;
+            if vertex.is_beyond(next.wi) {
+                inside = vertex.beyond;
+            }
             if is_last && !self.may_find_light(origin, direction) {
                 break;
             }
@@ -262,18 +273,6 @@ impl Integrator<'_> {
             let random = hash(hash(seed, bits), hash(instance, triangle)) >> 8;
             self.surfaces.coverage(instance, triangle, barycentric) > random as f32 / 16_777_216.0
         }
-    }
-
-    /// The vertex at a hit; `None` on a sphere light, which reflects nothing.
-    pub(super) fn vertex(&self, hit: &Hit, wo: Vec3) -> Option<Vertex> {
-        let HitSurface::Triangle { instance, triangle, barycentric } = hit.surface else {
-            return None;
-        };
-        let surface = self.surfaces.at(instance, triangle, barycentric, hit.anchor, wo);
-        let receiver = Receiver { point: hit.anchor.position, normal: surface.frame.normal };
-        let reflection = surface.bsdf().toward(wo);
-        let class = self.links.map_or(ReceiverClass::ALL, |links| links.of_instance(instance));
-        Some(Vertex { anchor: hit.anchor, reflection, wo, receiver, class })
     }
 
     /// What lights are picked for at a vertex.
@@ -293,8 +292,17 @@ impl Integrator<'_> {
         cells.find(point, normal, (hash(salt, CELL) >> 8) as f32 / 16_777_216.0)
     }
 
-    /// The share of light that fog lets through along a stretch of a ray.
-    fn through_fog(&self, origin: Vec3, direction: Vec3, length: f32) -> Rgb {
+    /// The share of light that fog or glass lets through along a stretch of a ray.
+    pub(super) fn through(
+        &self,
+        inside: Inside,
+        origin: Vec3,
+        direction: Vec3,
+        length: f32,
+    ) -> Rgb {
+        if let Some(absorption) = inside.filter(|_| built_in::TRANSMISSION) {
+            return (absorption * -length.min(f32::MAX)).exp();
+        }
         let through = |fog: &Fog| fog.transmittance(origin, direction, length);
         self.fog.as_ref().filter(|_| built_in::FOG).map_or(Rgb::ONE, through)
     }
@@ -407,37 +415,5 @@ impl Integrator<'_> {
         let Origin { wanted, how, bsdf_pdf, .. } = before;
         let expected = self.picker.expected(wanted, how, light, &mut scratch.picks) as f32;
         power_heuristic(*bsdf_pdf, expected * pdf())
-    }
-}
-
-impl Vertex {
-    /// What lights are picked for here. The BSDF is part of it only if it has a specular lobe. With a
-    /// sampler, a direction is sampled from the BSDF.
-    pub fn wanted(&self, sampler: Option<&mut Sampler>) -> Wanted {
-        let receiver = self.receiver;
-        let is_glossy =
-            |lobes: &Lobes| built_in::GLOSSY && lobes.at_normal + lobes.toward_grazing > 0.0;
-        let Some(lobes) = self.reflection.lobes().filter(is_glossy) else {
-            return self.wanted_at(Site::At(receiver));
-        };
-        // Independent of the direction in which the path continues: that one may hit a light, whose
-        // weight must not depend on the direction.
-        let drawn = sampler.and_then(|sampler| {
-            let [lobe, u, v, _] = sampler.next_4d();
-            self.reflection.sample(lobe, Vec2::new(u, v))
-        });
-        let toward = drawn.map_or(receiver.normal, |sample| sample.wi);
-        let glossy = Glossy { receiver, to_eye: self.wo, lobes, toward };
-        self.wanted_at(Site::Glossy(glossy))
-    }
-
-    fn wanted_at(&self, site: Site) -> Wanted {
-        Wanted { site, cell: Cell::NONE, class: self.class }
-    }
-
-    /// Whether `wi` is on the same side as `wo` of the geometric surface, and not only of the shading
-    /// normal.
-    pub fn lets_through(&self, wi: Vec3) -> bool {
-        self.anchor.normal.dot(wi) * self.anchor.normal.dot(self.wo) > 0.0
     }
 }

@@ -10,8 +10,8 @@
 //! away from `wo` is bent back until `wo` is above its horizon. It is not bent past the cosine between
 //! `wo` and the triangle's normal: a flat surface is never bent, however grazing `wo` is.
 
-use super::bsdf::{Bsdf, SurfaceSample};
-use super::rays::Anchor;
+use super::bsdf::{ALPHA_MIN, Bsdf, Passage, SurfaceSample};
+use super::rays::{Anchor, Hit, HitSurface};
 use crate::math::color::Rgb;
 use crate::math::directions::mirrors;
 use crate::math::{Frame, built_in};
@@ -22,12 +22,24 @@ use std::ops::{Add, Mul};
 /// The smallest cosine between `wo` and a shading normal that is not the triangle's own.
 const LEAST_COSINE: f32 = 1e-3;
 
+/// Solid glass bends light at least like this: without any bend, directions of 32 bits could not tell a lobe.
+const LEAST_IOR: f32 = 1.001;
+
+/// Whether a material is a pane: thin glass, so smooth that light passes it straight. Its GGX alpha is at most
+/// [`ALPHA_MIN`] everywhere, which is that of a roughness of 0.0316.
+pub fn is_pane(material: &Material) -> bool {
+    let is_thin = material.transmission.is_some_and(|passes| passes.volume.is_none());
+    is_thin && material.roughness * material.roughness <= ALPHA_MIN
+}
+
 /// Looks up what is at a hit, for one pose of a scene.
 #[derive(Clone, Debug)]
 pub struct Surfaces<'a> {
     scene: &'a Scene,
     pose: &'a Pose,
     plain: Material,
+    /// Whether any glass is solid.
+    has_volumes: bool,
 }
 
 /// A point that light arrives at and leaves from.
@@ -61,7 +73,11 @@ struct At<'a> {
 impl<'a> Surfaces<'a> {
     /// The surfaces of a scene as it stands in `pose`.
     pub fn new(scene: &'a Scene, pose: &'a Pose) -> Surfaces<'a> {
-        Surfaces { scene, pose, plain: Material::default() }
+        let is_solid = |material: &Material| {
+            material.transmission.is_some_and(|passes| passes.volume.is_some())
+        };
+        let has_volumes = scene.materials.iter().any(is_solid);
+        Surfaces { scene, pose, plain: Material::default(), has_volumes }
     }
 
     /// The share of light that a point blocks, in `[0, 1]`: its opacity in a blended material, 0 or 1 in
@@ -96,7 +112,36 @@ impl<'a> Surfaces<'a> {
         let least = anchor.normal.dot(wo).abs().min(LEAST_COSINE);
         let normal = toward(if front { normal } else { -normal }, wo, least);
         let frame = Frame::around(normal);
-        Surface { anchor, front, frame, sample: self.evaluate(&at, material) }
+        let mut sample = self.evaluate(&at, material);
+        if let Passage::Solid(ior) = sample.passage {
+            sample.passage = Passage::Solid(if front { ior } else { 1.0 / ior });
+        }
+        Surface { anchor, front, frame, sample }
+    }
+
+    /// What is behind the surface of solid glass: its absorption, 1/m. `None` if it is none.
+    #[inline]
+    pub fn volume(&self, instance: u32) -> Option<Rgb> {
+        if !(built_in::TRANSMISSION && self.has_volumes) {
+            return None;
+        }
+        let mesh = &self.scene.meshes[self.scene.instances[instance as usize].mesh as usize];
+        let material = &self.scene.materials[mesh.material? as usize];
+        Some(material.transmission?.volume?.absorption)
+    }
+
+    /// The share of light that a pane lets through along a unit direction, either way; none if the hit is on something
+    /// else.
+    pub fn tint(&self, pane: &Hit, direction: Vec3) -> Rgb {
+        let HitSurface::Triangle { instance, triangle, barycentric } = pane.surface else {
+            return Rgb::ZERO;
+        };
+        let (at, material) = self.locate(instance, triangle, barycentric);
+        let node = self.scene.instances[instance as usize].node;
+        let to_world = self.pose.world(node);
+        // Not bent towards either end, so that both ends see the same tint.
+        let normal = self.shading_normal(&at, material, &to_world, pane.anchor.normal);
+        self.evaluate(&at, material).tint(normal.dot(direction).abs())
     }
 
     fn locate(&self, instance: u32, triangle: u32, barycentric: Vec2) -> (At<'a>, &Material) {
@@ -133,6 +178,17 @@ impl<'a> Surfaces<'a> {
                 coat.roughness * self.lookup(at, &coat.roughness_texture).y,
             ),
         };
+        let (transmission, passage) = match &material.transmission {
+            Some(passes) if built_in::TRANSMISSION => {
+                let passage = match passes.volume {
+                    Some(_) => Passage::Solid(material.ior.max(LEAST_IOR)),
+                    None if is_pane(material) => Passage::Straight,
+                    None => Passage::Thin,
+                };
+                (passes.factor * self.lookup(at, &passes.factor_texture).x, passage)
+            }
+            _ => (0.0, Passage::Straight),
+        };
         SurfaceSample {
             base_color: material.base_color * base.truncate(),
             metallic: material.metallic * rough_metal.z,
@@ -141,6 +197,8 @@ impl<'a> Surfaces<'a> {
             dielectric_f90: specular,
             coat,
             coat_roughness,
+            transmission,
+            passage,
         }
     }
 

@@ -2,7 +2,7 @@
 
 use super::camera::CameraRay;
 use super::path::{Integrator, Vertex};
-use super::rays::Sender;
+use super::rays::{Passed, Sender};
 use crate::math::random::Sampler;
 use glam::Vec2;
 
@@ -36,13 +36,20 @@ impl Integrator<'_> {
         let CameraRay { mut origin, mut direction, mut reach_m } =
             self.camera.ray(x, y, Vec2::new(px, py), Vec2::new(lx, ly));
         let accept = self.cutouts(seed);
-        let mut lights = Vec::new();
+        let mut passed = Passed::default();
         for bounce in 0..most {
             let sender = if bounce == 0 { Sender::Camera } else { Sender::Surface };
             let ray = (origin, direction, reach_m);
-            let Some(hit) = self.tracer.look(sender, ray, &accept, &mut lights).hit else { break };
+            let hit = self.tracer.look(sender, ray, &accept, &mut passed).hit;
             reach_m = f32::INFINITY;
-            let Some(vertex) = self.vertex(&hit, -direction) else { break };
+            let vertex = if passed.panes.is_empty() {
+                hit.and_then(|hit| self.vertex(&hit, -direction))
+            } else {
+                self.tint_panes(&mut passed, direction);
+                let [u, ..] = sampler.next_4d();
+                self.through_panes((origin, direction), None, &passed, hit, u).vertex
+            };
+            let Some(vertex) = vertex else { break };
             let [lobe, bu, bv, _] = sampler.next_4d();
             let next = vertex.reflection.sample(lobe, Vec2::new(bu, bv));
             let next = next.filter(|next| vertex.lets_through(next.wi));

@@ -34,6 +34,8 @@ pub struct Material {
     pub specular_color_texture: Option<TextureUse>,
     /// A clear coat above all of that, if it has one.
     pub coat: Option<Coat>,
+    /// What passes through it in place of what it reflects diffusely, if anything does.
+    pub transmission: Option<Transmission>,
     /// Tangent-space normals, linear.
     pub normal_texture: Option<TextureUse>,
     /// Scale of the normal map's x and y.
@@ -58,6 +60,24 @@ pub struct Coat {
     pub roughness: f32,
     /// Linear texture: green multiplies the roughness.
     pub roughness_texture: Option<TextureUse>,
+}
+
+/// Light that passes through the dielectric, tinted by the base colour (`KHR_materials_transmission`).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Transmission {
+    /// The share of the diffuse part that passes instead, above 0 and at most 1.
+    pub factor: f32,
+    /// Linear texture: red multiplies the factor.
+    pub factor_texture: Option<TextureUse>,
+    /// What the surface encloses; `None` is a wall without thickness, which bends no light.
+    pub volume: Option<Volume>,
+}
+
+/// What solid glass is filled with (`KHR_materials_volume`). Its index of refraction is the material's.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Volume {
+    /// Absorption coefficient, 1/m.
+    pub absorption: Rgb,
 }
 
 /// What coverage means.
@@ -90,6 +110,7 @@ impl Default for Material {
             specular_color: Rgb::ONE,
             specular_color_texture: None,
             coat: None,
+            transmission: None,
             normal_texture: None,
             normal_scale: 1.0,
             emission_nits: Rgb::ZERO,
@@ -108,12 +129,14 @@ impl Material {
     /// The textures of its reflection, those that are there.
     pub fn textures(&self) -> impl Iterator<Item = TextureUse> {
         let coat = self.coat.map(|coat| [coat.factor_texture, coat.roughness_texture]);
+        let transmission = self.transmission.and_then(|transmission| transmission.factor_texture);
         let uses = [
             self.base_color_texture,
             self.metallic_roughness_texture,
             self.specular_texture,
             self.specular_color_texture,
             self.normal_texture,
+            transmission,
         ];
         uses.into_iter().chain(coat.into_iter().flatten()).flatten()
     }

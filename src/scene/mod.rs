@@ -47,7 +47,7 @@ pub use camera::{Camera, Projection};
 pub use ies_profile::{IesProfile, IesTable, LitCone, Pole};
 pub use light::{Light, LightKind, Shaping};
 pub use linking::{LinkRows, Linking, Links, Membership};
-pub use material::{AlphaMode, Coat, Material};
+pub use material::{AlphaMode, Coat, Material, Transmission, Volume};
 pub use medium::{FogBox, Medium};
 pub use mesh::{Instance, Mesh};
 pub use note::{Category, Note};

@@ -50,6 +50,10 @@ pub struct Requirements {
     pub glossy: usize,
     /// Materials with a clear coat.
     pub coats: usize,
+    /// Materials that light passes.
+    pub glass: usize,
+    /// Those of them that enclose a volume.
+    pub solid_glass: usize,
     /// Images.
     pub textures: usize,
     /// Homogeneous fog, 0 or 1.
@@ -123,6 +127,9 @@ impl Requirements {
             needs.normal_maps += usize::from(material.normal_texture.is_some());
             needs.glossy += usize::from(material.is_glossy());
             needs.coats += usize::from(material.coat.is_some());
+            needs.glass += usize::from(material.transmission.is_some());
+            let volume = material.transmission.and_then(|passes| passes.volume);
+            needs.solid_glass += usize::from(volume.is_some());
         }
         needs.glossy += usize::from(scene.meshes.iter().any(|mesh| mesh.material.is_none()));
         needs.fog = usize::from(scene.medium.is_some());

@@ -11,7 +11,7 @@ use candelabra::math::random::hash;
 use candelabra::math::warp;
 use candelabra::pipeline::load_scene;
 use candelabra::render::camera::CameraRays;
-use candelabra::render::rays::{Anchor, RayScene, Sender, Tracer};
+use candelabra::render::rays::{Anchor, Passed, RayScene, Sender, Tracer};
 use candelabra::scene::{LightKind, Pose, Scene};
 use glam::{DVec3, Vec2, Vec3};
 use std::fs;
@@ -94,10 +94,10 @@ fn camera_rays(camera: &CameraRays) -> Rays {
 
 /// Where rays end, each with the normal of the side that they see.
 fn anchors(tracer: &Tracer, rays: &Rays) -> Vec<(Anchor, Vec3)> {
-    let mut lights = Vec::new();
+    let mut passed = Passed::default();
     let mut hit = |&(from, to): &(Vec3, Vec3)| {
         let seen =
-            tracer.look(Sender::Camera, (from, to, f32::INFINITY), &|_, _, _| true, &mut lights);
+            tracer.look(Sender::Camera, (from, to, f32::INFINITY), &|_, _, _| true, &mut passed);
         let anchor = seen.hit?.anchor;
         let side = 1_f32.copysign(-anchor.normal.dot(to));
         Some((anchor, anchor.normal * side))
@@ -113,7 +113,7 @@ fn reflected(i: u32, at: &Anchor, normal: Vec3) -> (Vec3, Vec3) {
 
 /// Rays a second, and rays that hit something.
 fn measure(tracer: &Tracer, rays: &Rays, shadow: bool) -> (f64, usize) {
-    let mut lights = Vec::new();
+    let mut passed = Passed::default();
     let all = |_, _, _: Vec2| true;
     let mut round = || {
         let started = Instant::now();
@@ -123,7 +123,7 @@ fn measure(tracer: &Tracer, rays: &Rays, shadow: bool) -> (f64, usize) {
                 true => tracer.occluded(from, to, 1.0, &all),
                 false => {
                     let ray = (from, to, f32::INFINITY);
-                    tracer.look(Sender::Surface, ray, &all, &mut lights).hit.is_some()
+                    tracer.look(Sender::Surface, ray, &all, &mut passed).hit.is_some()
                 }
             };
             hits += usize::from(is_hit);

@@ -68,6 +68,26 @@ def test_what_exporters_write_out_in_full_is_not_lost(export):
     assert export(arnold(text)).report["warnings"] == []
 
 
+@pytest.mark.parametrize(
+    ("name", "weight", "color", "depth", "thin"),
+    [
+        ("standard_surface", "transmission", "transmission_color", "transmission_depth", "thin_walled"),
+        ("openpbr_surface", "transmission_weight", "transmission_color", "transmission_depth", "geometry_thin_walled"),
+    ],
+)
+def test_glass(gltf, name, weight, color, depth, thin):
+    text = f"float inputs:{weight} = 1\n color3f inputs:{color} = (0.5, 0.25, 1)\n float inputs:{depth} = 2"
+    for is_thin in (0, 1):
+        scene = gltf(arnold(f"{text}\n bool inputs:{thin} = {is_thin}", name=name))
+        extensions = scene.material("/M")["extensions"]
+        assert extensions["KHR_materials_transmission"] == {"transmissionFactor": 1.0}
+        # A wall without an inside is tinted as a whole.
+        assert base(scene) == pytest.approx([0.5, 0.25, 1] if is_thin else [1, 1, 1])
+        assert ("KHR_materials_volume" in extensions) == (not is_thin)
+        if not is_thin:
+            assert extensions["KHR_materials_volume"]["attenuationColor"] == pytest.approx([0.5, 0.25, 1])
+
+
 def test_lost_inputs_are_listed(export):
     text = "float inputs:sheen = 1\n float inputs:thin_film_thickness = 300\n float inputs:indirect_specular = 0.5"
     expected = {f"standard_surface {name}" for name in ("sheen", "thin_film_thickness", "indirect_specular")}

@@ -5,6 +5,7 @@ mod coat;
 mod corpus;
 mod files;
 mod fog;
+mod glass;
 mod gltf;
 mod links;
 mod malformed;

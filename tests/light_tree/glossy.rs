@@ -31,6 +31,8 @@ fn surface() -> impl Strategy<Value = (Bsdf, Glossy)> {
                 dielectric_f90,
                 coat,
                 coat_roughness,
+                transmission: 0.0,
+                passage: Default::default(),
             };
             let bsdf = Bsdf::new(&sample, Frame::around(any.receiver.normal));
             let lobes = bsdf.toward(any.to_eye).lobes()?;
@@ -93,6 +95,8 @@ fn a_reflection_is_found() {
         dielectric_f90: 1.0,
         coat: 0.0,
         coat_roughness: 0.0,
+        transmission: 0.0,
+        passage: Default::default(),
     };
     let paint = SurfaceSample { roughness: 0.6, coat: 1.0, coat_roughness: 0.15, ..stone };
     for sample in [stone, paint] {

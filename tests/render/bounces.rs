@@ -5,7 +5,7 @@ use crate::stage::{Stage, at, coat, direct, facing, glow, lambert};
 use crate::statistics::{Estimate, assert_even, pixels};
 use candelabra::render::buffers::RenderBuffers;
 use candelabra::render::{RenderDelegate, RenderSettings};
-use candelabra::scene::{AlphaMode, LightKind, Material};
+use candelabra::scene::{AlphaMode, LightKind, Material, Transmission};
 use glam::{DVec3, Vec3};
 use std::f64::consts::PI;
 
@@ -33,6 +33,13 @@ fn white_things() -> Vec<(String, Material, [f64; 2])> {
     for (metallic, factor, roughness) in [(0.0, 1.0, 0.1), (1.0, 0.7, 0.5)] {
         let thing = Material { metallic, coat: coat(factor, roughness), ..Default::default() };
         things.push((format!("coat of roughness {roughness}"), thing, [4e-3, 3e-2]));
+    }
+    for factor in [1.0, 0.5] {
+        let transmission = Some(Transmission { factor, factor_texture: None, volume: None });
+        let glass = Material { roughness: 0.0, transmission, ..Default::default() };
+        things.push((format!("a pane of {factor}"), glass.clone(), [4e-3, 3e-2]));
+        let coated = Material { coat: coat(1.0, 0.2), ..glass };
+        things.push((format!("a coated pane of {factor}"), coated, [4e-3, 3e-2]));
     }
     things
 }
@@ -73,7 +80,8 @@ fn nothing_white_is_seen_in_a_room_of_light() {
     for (what, material, off) in white_things() {
         let mut stage = ball(material);
         room(&mut stage, &glow(Vec3::ONE));
-        let buffers = stage.render(&direct(12, 1024));
+        // Light may be mirrored to and fro in glass.
+        let buffers = stage.render(&RenderSettings { depth: 9, ..direct(12, 1024) });
         assert_white(&format!("{what} between shining walls"), &buffers, off);
     }
 }

@@ -1,6 +1,6 @@
 //! A table of what is hidden: it changes noise, and nothing else.
 
-use crate::stage::{Set, Stage, at, direct, facing, lambert};
+use crate::stage::{Set, Stage, at, direct, facing, filter, lambert};
 use crate::statistics::Estimate;
 use crate::strategies::Way;
 use candelabra::learn::{LearnOptions, Lesson, learn};
@@ -8,9 +8,10 @@ use candelabra::light_tree::NoSuchFrame;
 use candelabra::light_tree::learned::{BESIDE, Plane, Table, ViewKeys};
 use candelabra::light_tree::{Veil, WIDTH};
 use candelabra::math::random::hash;
+use candelabra::pipeline;
 use candelabra::render::buffers::RenderBuffers;
 use candelabra::render::{RenderDelegate, RenderSettings};
-use candelabra::scene::LightKind;
+use candelabra::scene::{LightKind, Material};
 use glam::{DVec3, Vec3};
 
 /// A floor; a wall across it; lamps before the wall, and far stronger ones behind it.
@@ -78,6 +79,30 @@ fn walls_are_learned_and_pay() {
         assert!(plain.distance(&learned) < 5.0, "the means differ");
         assert!(gain > if way.split == 0.0 { 20.0 } else { 3.0 }, "{gain}");
     }
+}
+
+/// A tinted pane hides nothing; an opaque sheet in its place does.
+#[test]
+fn what_is_behind_a_pane_is_not_learned_to_be_hidden() {
+    let hidden = |sheet: Material| {
+        let mut stage = walled();
+        stage.scene.materials[1] = sheet;
+        lesson(&stage.set(), 4, 1 << 14).hidden
+    };
+    assert!(hidden(filter([0.1, 0.9, 0.2])) < 1e-2 && hidden(lambert([0.1, 0.9, 0.2])) > 0.3);
+}
+
+/// A table is out of date where a sheet of glass became opaque, but not where its tint changed.
+#[test]
+fn the_key_of_geometry_knows_panes() {
+    let key = |sheet: Material| {
+        let mut stage = walled();
+        stage.scene.materials[1] = sheet;
+        pipeline::view_keys(&stage.scene, &stage.scene.cameras[0]).geometry
+    };
+    let [red, blue, opaque] =
+        [filter([0.9, 0.1, 0.2]), filter([0.1, 0.1, 0.9]), lambert([0.9, 0.1, 0.2])].map(key);
+    assert!(red == blue && red != opaque);
 }
 
 #[test]

@@ -18,20 +18,20 @@ use std::f64::consts::PI;
 
 /// A light of a scene, by its row.
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Lamp {
+pub enum Lamp {
     Mesh(u32),
     Light(u32),
 }
 
 /// What a light is kept from, by rows of instances. `None` is the fog.
 #[derive(Clone, Debug)]
-enum Kept {
+pub enum Kept {
     Lighting(Lamp, Vec<Option<u32>>),
     Shadows(Lamp, Vec<Option<u32>>),
 }
 
 /// Links the lights of a scene to everything but what they are kept from.
-fn link(scene: &mut Scene, kept: &[Kept]) {
+pub fn link(scene: &mut Scene, kept: &[Kept]) {
     let mut rows = LinkRows::default();
     let mut outside: BTreeMap<Option<u32>, Vec<u32>> = BTreeMap::new();
     let mut links: BTreeMap<(bool, u32), Links> = BTreeMap::new();

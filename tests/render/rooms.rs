@@ -3,10 +3,12 @@
 //! All are seen in the same way: from above, floor only, so that no light is in the picture and
 //! its mean is reflected light alone. A wall stands behind, a card throws a shadow.
 
-use crate::stage::{Stage, aimed, at, coat, facing, glow, lambert, picture, scaled};
+use crate::stage::{
+    Stage, aimed, at, coat, facing, filter, glow, lambert, milk, picture, scaled, solid,
+};
 use candelabra::scene::{
     AlphaMode, IesProfile, IesTable, LightKind, Material, Node, Pixels, Pole, Shaping, Texture,
-    TextureUse, Wrap,
+    TextureUse, Transmission, Wrap,
 };
 use glam::{DVec3, Vec3};
 use std::f64::consts::{PI, TAU};
@@ -291,6 +293,32 @@ fn cut_outs(stage: &mut Stage, alpha_mode: AlphaMode) {
     stage.quad([0.6; 2], shining, facing(place, DVec3::ZERO));
 }
 
+/// Panes that lie above the floor and stand before the eye; one shines, one is a cut-out. What they mirror is rough,
+/// or picking alone could not find it.
+fn panes(stage: &mut Stage) {
+    some_lights(stage);
+    let tinted = Material { coat: coat(1.0, 0.4), ..filter(Vec3::new(0.9, 0.6, 0.8)) };
+    stage.quad([2.0, 1.0], tinted.clone(), facing(DVec3::Y * 0.55, DVec3::new(0.2, 2.0, 0.1)));
+    let transmission = Some(Transmission { factor: 0.7, factor_texture: None, volume: None });
+    let front = Material { transmission, ..tinted };
+    stage.quad([2.0; 2], front, facing(DVec3::new(0.0, 1.1, 1.4), DVec3::ZERO));
+    let shining = Material { emission_nits: Vec3::new(1.0, 2.0, 3.0), ..filter(Vec3::splat(0.5)) };
+    stage.quad([0.7; 2], shining, facing(DVec3::new(-0.3, 0.7, 0.2), DVec3::ZERO));
+    let base_color_texture = holes(stage);
+    let alpha_mode = AlphaMode::Blend;
+    let holed = Material { base_color_texture, alpha_mode, ..filter(Vec3::splat(0.7)) };
+    stage.quad([1.5; 2], holed, facing(DVec3::new(0.5, 0.4, 0.0), DVec3::new(0.5, 2.0, 0.3)));
+}
+
+/// Lights above the floor and, brighter, below it.
+fn lights_on_both_sides(stage: &mut Stage) {
+    some_lights(stage);
+    panel(stage, 0.6, glow(Vec3::new(9.0, 5.0, 4.0)), DVec3::new(0.5, -0.8, 0.2), DVec3::ZERO);
+    stage.light(sphere(Vec3::splat(20.0), 0.1, None), at(DVec3::new(-0.5, -0.6, 0.3)));
+    let intensity_cd = Vec3::splat(2.0);
+    stage.light(LightKind::Point { intensity_cd }, at(DVec3::new(0.1, -0.7, -0.2)));
+}
+
 pub fn of_every_material() -> Vec<Room> {
     let metal = |roughness| Material {
         base_color: Vec3::new(0.9, 0.7, 0.4),
@@ -299,6 +327,8 @@ pub fn of_every_material() -> Vec<Room> {
         ..Default::default()
     };
     let varnish = Material { roughness: 0.4, ..Material { specular: 1.0, ..plaster() } };
+    let absorption = Vec3::new(0.1, 0.5, 0.3);
+    let frosted = Material { roughness: 0.7, ..solid(1.4, absorption) };
     let paint = |factor, roughness| Material { coat: coat(factor, roughness), ..plaster() };
     vec![
         Room { name: "Lambert".into(), stage: lambert_room(), depth: 2 },
@@ -307,6 +337,10 @@ pub fn of_every_material() -> Vec<Room> {
         room("varnish", varnish, some_lights),
         room("a coat on plaster", paint(1.0, 0.3), some_lights),
         room("a thin coat on metal", Material { coat: coat(0.5, 0.4), ..metal(0.7) }, some_lights),
+        room("panes", plaster(), panes),
+        room("panes above a smooth metal", metal(0.4), panes),
+        room("a floor of milk glass", milk(0.6, 0.7), lights_on_both_sides),
+        room("a floor of rough solid glass", frosted, lights_on_both_sides),
         room("masked cut-outs", plaster(), |stage| cut_outs(stage, AlphaMode::Mask(0.5))),
         room("blended cut-outs", plaster(), |stage| cut_outs(stage, AlphaMode::Blend)),
         room("a normal map", plaster(), |stage| {

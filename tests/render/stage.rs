@@ -10,7 +10,7 @@ use candelabra::render::buffers::RenderBuffers;
 use candelabra::render::{LightStrategy, RenderDelegate, RenderSettings};
 use candelabra::scene::{
     Camera, Coat, Instance, Light, LightKind, Material, Mesh, Node, Pixels, Scene, Texture,
-    TextureUse, Trs, Wrap,
+    TextureUse, Transmission, Trs, Volume, Wrap,
 };
 use candelabra::store::AlignedBytes;
 use glam::{DQuat, DVec3, Vec2, Vec3};
@@ -65,6 +65,30 @@ pub fn lambert(albedo: impl Into<Vec3>) -> Material {
 /// What a material is coated with.
 pub fn coat(factor: f32, roughness: f32) -> Option<Coat> {
     Some(Coat { factor, factor_texture: None, roughness, roughness_texture: None })
+}
+
+/// A pane of smooth glass of some colour that mirrors nothing: it lets through the colour's share at every angle.
+pub fn filter(color: impl Into<Vec3>) -> Material {
+    let transmission = Some(Transmission { factor: 1.0, factor_texture: None, volume: None });
+    Material { transmission, roughness: 0.0, ..lambert(color) }
+}
+
+/// A wall of white glass without thickness, of some roughness and share that passes.
+pub fn milk(roughness: f32, factor: f32) -> Material {
+    let transmission = Some(Transmission { factor, factor_texture: None, volume: None });
+    Material { transmission, roughness, ..Default::default() }
+}
+
+/// The surface of smooth solid glass.
+pub fn solid(ior: f32, absorption: Vec3) -> Material {
+    let volume = Some(Volume { absorption });
+    let transmission = Some(Transmission { factor: 1.0, factor_texture: None, volume });
+    Material { transmission, roughness: 0.0, ior, ..Default::default() }
+}
+
+/// The same with the reflections of glass.
+pub fn pane(color: impl Into<Vec3>) -> Material {
+    Material { specular: 1.0, ..filter(color) }
 }
 
 /// A black surface that shines from its front.

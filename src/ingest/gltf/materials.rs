@@ -6,7 +6,7 @@
 
 use super::document::label;
 use super::textures::Textures;
-use super::{Output, Source, coat, glossiness};
+use super::{Output, Source, coat, glass, glossiness};
 use crate::ingest::image::{Coding, MISSING_REFLECTANCE};
 use crate::math::color::Rgb;
 use crate::scene::{AlphaMode, Category, Material};
@@ -130,7 +130,10 @@ impl Materials {
                 output.notes.add(Category::Lights, &*object, text);
             }
         }
-        for extension in extensions.others.keys().filter(|name| *name != coat::NAME) {
+        let others = &extensions.others;
+        material.transmission = glass::compile(&mut self.textures, source, output, others, &object);
+        let is_read = |name: &str| name == coat::NAME || glass::NAMES.contains(&name);
+        for extension in extensions.others.keys().filter(|name| !is_read(name)) {
             let text = match extension.as_str() {
                 "KHR_materials_unlit" => "is unlit; drawn as a surface that light falls on".into(),
                 extension => format!("{extension} is not read"),

@@ -15,7 +15,7 @@
 //! | `hierarchy` | nodes, parents first, and what stands at them |
 //! | `instancing`, `geometry`, `attributes` | meshes |
 //! | `posing` | skins and morph targets |
-//! | `materials`, `glossiness`, `coat`, `textures` | surfaces |
+//! | `materials`, `glossiness`, `coat`, `glass`, `textures` | surfaces |
 //! | `lights`, `fog`, `cameras`, `animation` | what they say |
 //! | `links` | which lights light what |
 
@@ -31,6 +31,7 @@ mod extensions;
 mod fog;
 mod forest;
 mod geometry;
+mod glass;
 mod glossiness;
 mod hierarchy;
 mod instancing;

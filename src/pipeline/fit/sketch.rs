@@ -10,7 +10,7 @@ use crate::bounds::Aabb;
 use crate::math::random::hash;
 use crate::math::{Frame, warp};
 use crate::pipeline::frames_of;
-use crate::render::rays::{Anchor, HitSurface, RayScene, Sender, Tracer};
+use crate::render::rays::{Anchor, HitSurface, Passed, RayScene, Sender, Tracer};
 use crate::scene::{AlphaMode, Instance, LightKind, Mesh, Node, Pose, Scene, Trs, Visibility};
 use glam::{DAffine3, DMat3, DVec3, Vec2, Vec3};
 use rayon::prelude::*;
@@ -160,13 +160,13 @@ fn is_blocked_toward(tracer: &Tracer, sample: &Sample, direction: Vec3) -> bool 
 fn blocks(tracer: &Tracer, sample: &Sample, direction: Vec3, length: f32, reach_m: f32) -> bool {
     let size = sample.point.abs().max_element();
     let mut anchor = Anchor::computed(sample.point, sample.normal, size);
-    let (mut gone, mut lights) = (0.0, Vec::new());
+    let (mut gone, mut passed) = (0.0, Passed::default());
     // A ray meets few squares near its ends; it cannot go on for ever.
     for _ in 0..16 {
         let origin = anchor.origin_toward(direction);
         let left = (length - gone) * (1.0 - 1e-4);
         let ray = (origin, direction, left);
-        let seen = tracer.look(Sender::Surface, ray, &|_, _, _| true, &mut lights);
+        let seen = tracer.look(Sender::Surface, ray, &|_, _, _| true, &mut passed);
         let Some(hit) = seen.hit else { return false };
         gone += hit.t;
         let is_square = matches!(hit.surface, HitSurface::Triangle { instance: SQUARES, .. });
@@ -264,7 +264,9 @@ impl<'a> Drawing<'a> {
         };
         // What the camera does not see is in the way of no view.
         let is_opaque = sample.is_visible
-            && material.is_none_or(|material| material.alpha_mode == AlphaMode::Opaque);
+            && material.is_none_or(|material| {
+                material.alpha_mode == AlphaMode::Opaque && material.transmission.is_none()
+            });
         let is_coarse = 0.5 * across.length() >= share_m2;
         // A square that stands for much of a ground must not cut through what stands on it.
         let is_rough = || {

@@ -27,6 +27,12 @@ fn smith(cosine: f32, alpha: f32) -> f32 {
     (alpha * alpha * (1.0 - c2).max(0.0) + c2).sqrt()
 }
 
+/// Smith's `G1`, for one direction alone.
+#[inline]
+pub fn masking(cosine: f32, alpha: f32) -> f32 {
+    2.0 * cosine / (cosine + smith(cosine, alpha)).max(f32::MIN_POSITIVE)
+}
+
 /// `cos_i * G2 / (4 cos_o cos_i)`: masking and shadowing with the microfacet model's denominator
 /// and the receiver's cosine, finite at the horizon.
 #[inline]

@@ -1,8 +1,8 @@
-//! How a surface reflects: Lambert below GGX, glTF's metallic-roughness model, perhaps below a clear coat.
+//! How a surface reflects: Lambert below GGX, glTF's metallic-roughness model, perhaps below a clear coat, perhaps glass.
 //!
 //! A [`Bsdf`] is one shading point, with textures already looked up into a [`SurfaceSample`]; a
 //! [`Reflection`] is that point seen from one direction, `wo`.
-//! It is opaque and reflects on the side of its frame's normal alone; it knows nothing of
+//! It reflects on the side of its frame's normal alone, and [glass](glass) lets light through; it knows nothing of
 //! materials, of emission or of the geometric normal (a caller that must not leak light through
 //! bent normals compares `wi` with the geometric normal itself).
 //!
@@ -16,6 +16,9 @@
 //! diffuse = base / pi * (1 - albedo of f_gloss toward wo)
 //! ```
 //!
+//! Where light passes, with the share `t` of `KHR_materials_transmission`, `(1 - t) diffuse + t f_glass` takes the place
+//! of `diffuse`; where the glass is solid, that of `f_gloss + diffuse`.
+//!
 //! The coat is `KHR_materials_clearcoat`'s: `c` its strength, an index of 1.5, a roughness of its own. Where it is
 //! smooth, its albedo is Fresnel's term at `wo`, by which the extension darkens what is below.
 //!
@@ -25,6 +28,7 @@
 
 pub mod albedo;
 pub mod ggx;
+mod glass;
 #[cfg(test)]
 mod tests;
 
@@ -33,6 +37,8 @@ use crate::math::color::{Rgb, luminance};
 use crate::math::{Frame, built_in, warp};
 use albedo::Albedo;
 use glam::{Vec2, Vec3};
+use glass::Glass;
+pub use glass::Passage;
 use std::f32::consts::FRAC_1_PI;
 
 /// The smallest GGX alpha, reached at roughness 0.032: smoother surfaces reflect like this one, so
@@ -61,6 +67,29 @@ pub struct SurfaceSample {
     pub coat: f32,
     /// Perceptual roughness of the coat.
     pub coat_roughness: f32,
+    /// The share of the diffuse lobe's light that passes instead.
+    pub transmission: f32,
+    /// How.
+    pub passage: Passage,
+}
+
+impl SurfaceSample {
+    /// The share of light that passes straight in a direction with this cosine to the normal: what neither the coat
+    /// nor the specular lobe reflects, times the base colour. With [`Reflection::albedo`] it adds up to 1 where
+    /// everything is white.
+    pub fn tint(&self, cosine: f32) -> Rgb {
+        let bsdf = Bsdf::new(self, Frame::around(Vec3::Z));
+        let whole = bsdf.passing;
+        if whole == Rgb::ZERO || !bsdf.is_glossy() {
+            return whole;
+        }
+        let (gloss, _) = bsdf.gloss(Albedo::of_ggx(cosine, bsdf.alpha));
+        let below = match bsdf.coat > 0.0 {
+            true => 1.0 - Coat::toward(cosine, bsdf.coat, bsdf.coat_alpha).0,
+            false => 1.0,
+        };
+        whole * (Rgb::ONE - gloss) * below
+    }
 }
 
 /// A reflecting point. Directions are unit, world space, and point away from the surface.
@@ -68,6 +97,8 @@ pub struct SurfaceSample {
 pub struct Bsdf {
     frame: Frame,
     diffuse: Rgb,
+    /// What would pass if nothing were reflected.
+    passing: Rgb,
     metal_f0: Rgb,
     dielectric_f0: Rgb,
     dielectric_f90: f32,
@@ -75,6 +106,9 @@ pub struct Bsdf {
     alpha: f32,
     coat: f32,
     coat_alpha: f32,
+    passage: Passage,
+    /// The share of the surface that is solid glass.
+    solid: f32,
 }
 
 /// A direction drawn by [`Reflection::sample`].
@@ -104,6 +138,7 @@ pub struct Reflection {
     /// horizon, or the surface is black.
     specular_probability: Option<f32>,
     coat: Coat,
+    glass: Glass,
 }
 
 /// The coat's lobe. Its colour is `strength * (F0 + (1 - F0) * (1 - cos_h)^5)`.
@@ -138,9 +173,12 @@ impl Bsdf {
         let unit_rgb = |c: Rgb| Rgb::new(unit(c.x), unit(c.y), unit(c.z));
         let (metallic, roughness) = (unit(sample.metallic), unit(sample.roughness));
         let base = unit_rgb(sample.base_color);
+        let transmission = unit(sample.transmission);
+        let is_solid = matches!(sample.passage, Passage::Solid(_));
         Bsdf {
             frame,
-            diffuse: base * ((1.0 - metallic) * FRAC_1_PI),
+            diffuse: base * ((1.0 - metallic) * FRAC_1_PI) * (1.0 - transmission),
+            passing: base * ((1.0 - metallic) * transmission),
             metal_f0: base,
             dielectric_f0: unit_rgb(sample.dielectric_f0),
             dielectric_f90: unit(sample.dielectric_f90),
@@ -148,13 +186,43 @@ impl Bsdf {
             alpha: (roughness * roughness).max(ALPHA_MIN),
             coat: if built_in::GLOSSY { unit(sample.coat) } else { 0.0 },
             coat_alpha: unit(sample.coat_roughness).powi(2).max(ALPHA_MIN),
+            passage: sample.passage,
+            solid: if is_solid { (1.0 - metallic) * transmission } else { 0.0 },
         }
     }
 
     /// Whether it has a specular lobe. Without one it is Lambertian.
     fn is_glossy(&self) -> bool {
         let is_dielectric = self.dielectric_f90 > 0.0 || self.dielectric_f0 != Rgb::ZERO;
-        built_in::GLOSSY && (is_dielectric || self.metallic > 0.0 || self.coat > 0.0)
+        let has_lobe = self.passage != Passage::Straight && self.passing != Rgb::ZERO;
+        let is_glass = built_in::TRANSMISSION && (has_lobe || self.solid > 0.0);
+        built_in::GLOSSY && (is_dielectric || self.metallic > 0.0 || self.coat > 0.0 || is_glass)
+    }
+
+    /// The albedo of the dielectric's specular lobe, of the table's parts, and the gain that is in it.
+    fn gloss(&self, part: Albedo) -> (Rgb, Rgb) {
+        let lost = (1.0 - part.a - part.b).max(0.0) / (part.a + part.b);
+        let gain = Rgb::ONE + self.dielectric_f0 * lost;
+        let f90 = Rgb::splat(self.dielectric_f90);
+        (((self.dielectric_f0 * part.a + f90 * part.b) * gain).min(Rgb::ONE), gain)
+    }
+
+    /// The lobe beyond the surface, its probability still open. `below` is what the coat lets through.
+    fn glass_toward(&self, cos_o: f32, (part, gloss): (Albedo, Rgb), below: f32) -> Glass {
+        let (passage, alpha, color) = (self.passage, self.alpha, self.passing * below);
+        let (mirrors, f0, f90) = (self.solid * below, self.dielectric_f0, self.dielectric_f90);
+        let glass = Glass { passage, alpha, color, mirrors, f0, f90, ..Glass::default() };
+        match passage {
+            Passage::Straight => Glass::default(),
+            Passage::Thin => {
+                let whole = color * (Rgb::ONE - gloss);
+                Glass { color: whole / (part.a + part.b), whole, ..glass }
+            }
+            Passage::Solid(eta) => {
+                let (fresnel, _) = glass.fresnel(eta, cos_o);
+                Glass { whole: mirrors * fresnel + color * (Rgb::ONE - fresnel), ..glass }
+            }
+        }
     }
 
     /// Towards `wo`.
@@ -169,6 +237,7 @@ impl Bsdf {
             alpha: self.alpha,
             specular_probability: None,
             coat: Coat::default(),
+            glass: Glass::default(),
         };
         if wo.z <= 0.0 {
             return reflection;
@@ -179,12 +248,11 @@ impl Bsdf {
             reflection.specular_probability = (self.diffuse != Rgb::ZERO).then_some(0.0);
             return reflection;
         }
-        let whole = 1.0 - self.metallic;
+        let whole = 1.0 - self.metallic - self.solid;
         let part = Albedo::of_ggx(wo.z, self.alpha);
         let lost = (1.0 - part.a - part.b).max(0.0) / (part.a + part.b);
         let (f0, f90) = (self.dielectric_f0, Rgb::splat(self.dielectric_f90));
-        let gloss_gain = Rgb::ONE + f0 * lost;
-        let gloss = ((f0 * part.a + f90 * part.b) * gloss_gain).min(Rgb::ONE);
+        let (gloss, gloss_gain) = self.gloss(part);
         let metal_gain = Rgb::ONE + self.metal_f0 * lost;
         let metal = (self.metal_f0 * part.a + part.b) * metal_gain;
         reflection.diffuse = self.diffuse * (Rgb::ONE - gloss);
@@ -203,9 +271,16 @@ impl Bsdf {
             specular *= below;
             coat_part = 3.0 * reflected;
         }
-        let all = coat_part + specular + reflection.diffuse.element_sum() / FRAC_1_PI;
+        let mut all = coat_part + specular + reflection.diffuse.element_sum() / FRAC_1_PI;
+        if built_in::TRANSMISSION && self.passage != Passage::Straight {
+            let below = 1.0 - coat_part / 3.0;
+            reflection.glass = self.glass_toward(wo.z, (part, gloss), below);
+            all += reflection.glass.whole.element_sum();
+        }
         reflection.coat.probability = if all > 0.0 { coat_part / all } else { 0.0 };
         reflection.specular_probability = (all > 0.0).then(|| specular / all);
+        let glass_part = reflection.glass.whole.element_sum();
+        reflection.glass.probability = if glass_part > 0.0 { glass_part / all } else { 0.0 };
         reflection
     }
 }
@@ -228,6 +303,9 @@ impl Reflection {
             let alpha = if u_lobe < specular { self.alpha } else { self.coat.alpha };
             let h = ggx::sample_normal(self.wo, alpha, u);
             (2.0 * self.wo.dot(h) * h - self.wo).normalize()
+        } else if built_in::TRANSMISSION && u_lobe < specular + coat + self.glass.probability {
+            let u_side = (u_lobe - specular - coat) / self.glass.probability;
+            self.glass.sample(self.wo, u_side, u)
         } else {
             warp::cosine_hemisphere(u)
         };
@@ -283,15 +361,45 @@ impl Reflection {
         (specular, self.diffuse / FRAC_1_PI)
     }
 
+    /// Both together, and what passes glass.
+    pub fn whole_albedo(&self) -> Rgb {
+        let (specular, diffuse) = self.albedo();
+        specular + diffuse + self.glass.whole
+    }
+
+    /// Unit shading normal on the side of `wo`, world space.
+    pub fn normal(&self) -> Vec3 {
+        self.frame.normal
+    }
+
+    /// Whether light from beyond the surface may leave towards `wo`.
+    #[inline]
+    pub fn transmits(&self) -> bool {
+        built_in::TRANSMISSION && self.glass.probability > 0.0
+    }
+
+    /// Whether a direction is on the side of the shading normal, not beyond the surface.
+    pub fn is_above(&self, wi: Vec3) -> bool {
+        self.frame.normal.dot(wi) > 0.0
+    }
+
     #[inline]
     fn eval_local(&self, wi: Vec3) -> (Rgb, f32) {
         let (cos_o, cos_i) = (self.wo.z, wi.z);
-        let Some(specular_probability) = self.specular_probability.filter(|_| cos_i > 0.0) else {
+        let Some(specular_probability) = self.specular_probability else {
             return (Rgb::ZERO, 0.0);
         };
+        let glass = match self.transmits() {
+            true => self.glass.eval(self.wo, wi),
+            false => (Rgb::ZERO, 0.0),
+        };
+        if cos_i <= 0.0 {
+            return (glass.0, glass.1 * self.glass.probability);
+        }
         let mut value = self.diffuse * cos_i;
         let glossy_probability = specular_probability + self.coat.probability;
-        let mut pdf = (1.0 - glossy_probability) * warp::cosine_hemisphere_pdf(cos_i);
+        let diffuse_probability = 1.0 - glossy_probability - self.glass.probability;
+        let mut pdf = diffuse_probability * warp::cosine_hemisphere_pdf(cos_i);
         if built_in::GLOSSY && glossy_probability > 0.0 {
             let h = (self.wo + wi).normalize_or(Vec3::Z);
             let schlick = (1.0 - self.wo.dot(h)).clamp(0.0, 1.0).powi(5);
@@ -305,6 +413,6 @@ impl Reflection {
                 pdf += probability * ggx::reflection_pdf(cos_o, h, alpha);
             }
         }
-        (value, pdf)
+        (value + glass.0, pdf + glass.1 * self.glass.probability)
     }
 }

@@ -1,6 +1,8 @@
 //! Laws: energy, densities, limits. The Monte Carlo here is a fixed Hammersley set, so a failure
 //! is a failure every time.
 
+mod glass;
+
 use super::*;
 use std::f32::consts::{PI, TAU};
 
@@ -22,6 +24,8 @@ fn dielectric(base: f32, roughness: f32) -> SurfaceSample {
         dielectric_f90: 1.0,
         coat: 0.0,
         coat_roughness: 0.0,
+        transmission: 0.0,
+        passage: Default::default(),
     }
 }
 
@@ -206,6 +210,8 @@ fn the_horizon_and_the_mirror_stay_finite() {
         dielectric_f90: f32::INFINITY,
         coat: f32::INFINITY,
         coat_roughness: -1.0,
+        transmission: f32::NAN,
+        passage: Default::default(),
     };
     let mirrors = coated(metal(1.0, 0.0), 1.0, 0.0);
     for sample in [wild, mirrors, metal(1.0, 0.0), dielectric(1.0, 0.0), dielectric(0.0, 1.0)] {

@@ -16,6 +16,7 @@
 //! - Sphere lights are surfaces that a ray hits from outside and from inside.
 //! - Which prims a ray meets depends on who [sent](Sender) it, by their
 //!   [`Visibility`](crate::scene::Visibility).
+//! - Glass that light passes straight, a *pane*, ends no ray. Rays between two points are tinted by it.
 //! - Surfaces in one place are told apart by rules that know nothing of the order of the prims;
 //!   see [`Tracer::look`] and the page of `sight`.
 //! - Preparing takes `O(n log n)` time for every input.
@@ -41,7 +42,7 @@ mod wide_bvh;
 pub use anchor::Anchor;
 pub use meeting::{Hit, HitSurface};
 pub use prim::Sender;
-pub use sight::{Seen, SeenLight};
+pub use sight::{Passed, Seen, SeenLight, SeenPane};
 pub use tracer::{Caster, Tracer};
 
 use crate::scene::{Instance, LightKind, Mesh, Pose, Scene};

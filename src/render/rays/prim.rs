@@ -1,5 +1,7 @@
 //! What a ray must know of a prim that it meets.
 
+use super::super::surface::is_pane;
+use crate::math::built_in;
 use crate::math::directions::mirrors;
 use crate::scene::{AlphaMode, Pose, Scene, Visibility};
 
@@ -15,7 +17,7 @@ pub enum Sender {
 /// What a prim is to a ray.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Role {
-    /// The ray ends on it.
+    /// The ray ends on it, or passes it if it is a pane.
     Surface,
     /// The ray takes up its light and goes on.
     Light,
@@ -32,6 +34,8 @@ pub(super) struct Prim {
     pub rank: u32,
     /// A hit on it must be asked about.
     pub is_cutout: bool,
+    /// Rays pass it, tinted.
+    pub is_pane: bool,
     /// Its transform mirrors.
     pub mirrors: bool,
     visibility: Visibility,
@@ -49,6 +53,7 @@ impl Prim {
         Prim {
             rank,
             is_cutout: material.is_some_and(|m| m.alpha_mode != AlphaMode::Opaque),
+            is_pane: built_in::TRANSMISSION && material.is_some_and(is_pane),
             mirrors: mirrors(&pose.world(instance.node)),
             visibility: instance.visibility,
             shines: scene.rgb_of_instance(row, pose).max_element() > 0.0,
@@ -61,6 +66,7 @@ impl Prim {
         Prim {
             rank,
             is_cutout: false,
+            is_pane: false,
             mirrors: false,
             visibility: scene.lights[row as usize].visibility,
             shines: scene.rgb_of_light(row, pose).max_element() > 0.0,
@@ -71,7 +77,7 @@ impl Prim {
     /// Whether every ray ends on it, and finds no light.
     #[inline]
     pub fn is_plain(&self) -> bool {
-        !self.shines && self.visibility == Visibility::ALL
+        !self.shines && !self.is_pane && self.visibility == Visibility::ALL
     }
 
     /// Whether a ray that meets it, at its front or its back, meets light.

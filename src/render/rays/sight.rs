@@ -1,4 +1,4 @@
-//! What one ray sees: the surface it ends on, and the lights on the way.
+//! What one ray sees: the surface it ends on, and the lights and panes on the way.
 //!
 //! Lights and surfaces may share a place: a panel flush with a ceiling, two lamps put where one was.
 //! A light sample is not hidden by what lies within the rounding of its own position, so a reflected
@@ -9,11 +9,15 @@
 //! - Of those that are one with the nearest, every light that shines towards the ray is seen.
 //! - The ray ends on the nearest of these lights; without one, on the nearest surface. Of two at
 //!   the very same distance, it is the one whose path comes first.
+//!
+//! Panes are glass that light passes straight (see [`is_pane`](super::super::surface::is_pane)). Every pane before the
+//! end counts, by itself, as it does for a ray between two points; one that is one with a light does not cover it.
 
 use super::anchor::Anchor;
 use super::meeting::{Hit, Meeting};
 use super::prim::{Prim, Role, Sender};
 use super::triangles::Ray;
+use crate::math::color::Rgb;
 
 /// How far apart two surfaces may be, relative to their coordinates, and still be one. Two copies of
 /// one plane, each rounded to 32 bits in its own way, are less than half of this apart.
@@ -31,9 +35,61 @@ pub struct SeenLight {
     cosine: f64,
     /// The ray may end on it.
     is_surface: bool,
+    /// Panes nearer than this are before it, not one with it.
+    covered_to: f64,
 }
 
-/// What a ray saw but for the lights.
+/// A pane that a ray passes.
+#[derive(Clone, Copy, Debug)]
+pub struct SeenPane {
+    /// Where.
+    pub hit: Hit,
+    /// The share of light that it lets through along the ray: all, until somebody who knows it says otherwise.
+    pub tint: Rgb,
+    t: f64,
+    /// The ray meets it; if not, it tints only what lights send along the ray.
+    is_met: bool,
+}
+
+/// What a ray passes on its way, near things first. Reused from ray to ray.
+#[derive(Debug, Default)]
+pub struct Passed {
+    /// Lights, also that on which it ends.
+    pub lights: Vec<SeenLight>,
+    /// Panes.
+    pub panes: Vec<SeenPane>,
+}
+
+impl Passed {
+    /// The panes that the ray meets.
+    pub fn met(&self) -> impl Iterator<Item = &SeenPane> {
+        self.panes.iter().filter(|pane| pane.is_met)
+    }
+
+    /// The share of light that panes let through from a point of the ray.
+    pub fn tint(&self, t: f32) -> Rgb {
+        let before = self.met().take_while(|pane| pane.hit.t < t);
+        before.fold(Rgb::ONE, |share, pane| share * pane.tint)
+    }
+
+    /// The same from a light.
+    pub fn tint_of(&self, light: &SeenLight) -> Rgb {
+        let before = self.panes.iter().take_while(|pane| pane.t < light.covered_to);
+        before.fold(Rgb::ONE, |share, pane| share * pane.tint)
+    }
+
+    /// The same from infinity.
+    pub fn tint_of_sky(&self) -> Rgb {
+        self.panes.iter().fold(Rgb::ONE, |share, pane| share * pane.tint)
+    }
+
+    fn clear(&mut self) {
+        self.lights.clear();
+        self.panes.clear();
+    }
+}
+
+/// What a ray saw but for what it passed.
 #[derive(Clone, Copy, Debug)]
 pub struct Seen {
     /// Where it ended.
@@ -51,27 +107,40 @@ pub(super) struct Sight<'a> {
     /// The nearest other surface.
     second: f64,
     shade: f64,
-    lights: &'a mut Vec<SeenLight>,
+    passed: &'a mut Passed,
+}
+
+/// Whether two meetings with a pane are one: a ray that goes through an edge may meet the triangles on both sides of it.
+pub(super) fn is_one_meeting(ray: &Ray, a: (u32, f64), b: (u32, f64)) -> bool {
+    a.0 == b.0 && (a.1 - b.1).abs() <= tolerance_at(ray, a.1) / LEAST_COSINE
+}
+
+/// How far apart along the normal surfaces at a distance may be and still be one, in lengths of the direction.
+fn tolerance_at(ray: &Ray, t: f64) -> f64 {
+    let place = ray.origin + t * ray.direction;
+    ONE_SURFACE * place.abs().max_element() / ray.direction.length() + 4.0 * f64::EPSILON * t
+}
+
+/// A hit on one of several surfaces in one place: a ray that leaves one of them must leave all.
+fn leaving_all(hit: Hit) -> Hit {
+    let apart = ONE_SURFACE as f32 * hit.anchor.position.abs().max_element();
+    let error_m = hit.anchor.error_m.max(apart);
+    Hit { anchor: Anchor { error_m, ..hit.anchor }, ..hit }
 }
 
 impl<'a> Sight<'a> {
-    pub fn new(ray: &'a Ray, sender: Sender, tmax: f64, lights: &'a mut Vec<SeenLight>) -> Self {
-        lights.clear();
+    pub fn new(ray: &'a Ray, sender: Sender, tmax: f64, passed: &'a mut Passed) -> Self {
+        passed.clear();
         let (second, shade) = (f64::INFINITY, f64::INFINITY);
-        Sight { ray, sender, tmax, nearest: None, second, shade, lights }
-    }
-
-    /// How far apart along the normal surfaces at a distance may be, in lengths of the direction.
-    fn tolerance(&self, t: f64) -> f64 {
-        let place = self.ray.origin + t * self.ray.direction;
-        ONE_SURFACE * place.abs().max_element() / self.ray.direction.length()
-            + 4.0 * f64::EPSILON * t
+        Sight { ray, sender, tmax, nearest: None, second, shade, passed }
     }
 
     /// Beyond this nothing is of interest.
     pub fn limit(&self) -> f64 {
         match &self.nearest {
-            Some((Meeting { t, .. }, _)) => (t + self.tolerance(*t) / LEAST_COSINE).min(self.tmax),
+            Some((Meeting { t, .. }, _)) => {
+                (t + tolerance_at(self.ray, *t) / LEAST_COSINE).min(self.tmax)
+            }
             None => self.tmax,
         }
     }
@@ -88,15 +157,21 @@ impl<'a> Sight<'a> {
             return;
         }
         let t = meeting.t;
-        if role == Role::Shade {
+        // Without shadows a prim is nothing but its light, and does not tint.
+        let is_pane = prim.is_pane && role != Role::Light;
+        if is_pane {
+            let (hit, is_met) = (meeting.hit(self.ray, prim), role == Role::Surface);
+            self.passed.panes.push(SeenPane { hit, tint: Rgb::ONE, t, is_met });
+        } else if role == Role::Shade {
             self.shade = self.shade.min(t);
             return;
         }
-        let is_surface = role == Role::Surface;
-        if shines {
+        let is_surface = role == Role::Surface && !is_pane;
+        if shines && role != Role::Shade {
             let cosine = meeting.cosine(self.ray, prim).max(LEAST_COSINE);
             let hit = meeting.hit(self.ray, prim);
-            self.lights.push(SeenLight { hit, t, cosine, is_surface });
+            let covered_to = t;
+            self.passed.lights.push(SeenLight { hit, t, cosine, is_surface, covered_to });
         }
         if !is_surface {
             return;
@@ -115,29 +190,54 @@ impl<'a> Sight<'a> {
     }
 
     /// What was seen. Leaves the lights that are not hidden, in the order in which they are met.
-    pub fn finish(self) -> Seen {
+    pub fn finish(mut self) -> Seen {
         let end = self.nearest.as_ref().map_or(f64::INFINITY, |(nearest, _)| nearest.t);
-        let tolerance = if end.is_finite() { self.tolerance(end) } else { 0.0 };
+        let tolerance = if end.is_finite() { tolerance_at(self.ray, end) } else { 0.0 };
         let before = end.min(self.shade);
-        self.lights.retain(|light| light.t <= before + tolerance / light.cosine);
-        self.lights.sort_unstable_by(|a, b| {
+        self.passed.lights.retain(|light| light.t <= before + tolerance / light.cosine);
+        self.passed.lights.sort_unstable_by(|a, b| {
             a.t.total_cmp(&b.t).then_with(|| a.hit.surface.order().cmp(&b.hit.surface.order()))
         });
+        let flush = self.order_panes(end, tolerance);
         let hit = self.nearest.map(|(nearest, prim)| {
-            let light = self.lights.iter().find(|light| light.is_surface);
+            let light = self.passed.lights.iter().find(|light| light.is_surface);
             let hit = light.map_or_else(|| nearest.hit(self.ray, &prim), |light| light.hit);
-            if self.second == f64::INFINITY {
+            if self.second == f64::INFINITY && !flush {
                 return hit;
             }
             let cosine = nearest.cosine(self.ray, &prim).max(LEAST_COSINE);
-            if self.second > end + tolerance / cosine {
+            if self.second > end + tolerance / cosine && !flush {
                 return hit;
             }
-            // A ray that leaves one of the surfaces must leave all of them.
-            let apart = ONE_SURFACE as f32 * hit.anchor.position.abs().max_element();
-            let error_m = hit.anchor.error_m.max(apart);
-            Hit { anchor: Anchor { error_m, ..hit.anchor }, ..hit }
+            leaving_all(hit)
         });
         Seen { hit, in_shade: self.shade < end }
+    }
+
+    /// Sorts out the panes. Whether any is one with the end.
+    fn order_panes(&mut self, end: f64, tolerance: f64) -> bool {
+        if self.passed.panes.is_empty() {
+            return false;
+        }
+        let ray = self.ray;
+        let beside = |t: f64| tolerance_at(ray, t) / LEAST_COSINE;
+        let Passed { lights, panes } = &mut *self.passed;
+        panes.retain(|pane| pane.t < end);
+        panes.sort_unstable_by(|a, b| {
+            a.t.total_cmp(&b.t).then_with(|| a.hit.surface.order().cmp(&b.hit.surface.order()))
+        });
+        let meeting = |pane: &SeenPane| (pane.hit.surface.order().1, pane.t);
+        panes.dedup_by(|next, pane| is_one_meeting(ray, meeting(pane), meeting(next)));
+        for at in 1..panes.len() {
+            if panes[at].t - panes[at - 1].t <= beside(panes[at].t) {
+                panes[at - 1].hit = leaving_all(panes[at - 1].hit);
+                panes[at].hit = leaving_all(panes[at].hit);
+            }
+        }
+        for light in lights {
+            light.covered_to = light.t - tolerance_at(ray, light.t) / light.cosine;
+        }
+        let flush = panes.last_mut().filter(|pane| end - pane.t <= tolerance / LEAST_COSINE);
+        flush.map(|pane| pane.hit = leaving_all(pane.hit)).is_some()
     }
 }

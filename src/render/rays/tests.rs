@@ -22,7 +22,7 @@ fn closest(
     tmax: f32,
     accept: &impl Fn(u32, u32, Vec2) -> bool,
 ) -> Option<Hit> {
-    tracer.look(Sender::Surface, (origin, direction, tmax), accept, &mut Vec::new()).hit
+    tracer.look(Sender::Surface, (origin, direction, tmax), accept, &mut Passed::default()).hit
 }
 
 /// Uniform numbers, the same every time.

@@ -4,11 +4,12 @@ use super::blas::search_limit;
 use super::meeting::{Meeting, On};
 use super::placing::{Item, Placing};
 use super::prim::{Prim, Sender};
-use super::sight::{Seen, SeenLight, Sight};
+use super::sight::{Passed, Seen, Sight, is_one_meeting};
 use super::triangles::{Ray, barycentric};
 use super::wide_bvh::BoxRay;
-use super::{Anchor, RayScene};
+use super::{Anchor, Hit, RayScene};
 use crate::math::built_in;
+use crate::math::color::Rgb;
 use crate::scene::{Pose, Scene};
 use glam::{DVec3, Vec2, Vec3};
 use std::sync::Arc;
@@ -64,8 +65,8 @@ impl<'a> Tracer<'a> {
         Tracer { scene: prepared, moving, prims }
     }
 
-    /// What a ray sees at distances in `(0, tmax)`, in lengths of `direction`; the lights among it go
-    /// to `lights`. `accept` takes an instance, a triangle and the barycentric weights of its second
+    /// What a ray sees at distances in `(0, tmax)`, in lengths of `direction`; the lights and panes among it go
+    /// to `passed`. `accept` takes an instance, a triangle and the barycentric weights of its second
     /// and third corner, and says whether a hit on a cut-out counts. A ray that is not finite sees
     /// nothing.
     pub fn look(
@@ -73,13 +74,13 @@ impl<'a> Tracer<'a> {
         sender: Sender,
         (origin, direction, tmax): (Vec3, Vec3, f32),
         accept: &impl Fn(u32, u32, Vec2) -> bool,
-        lights: &mut Vec<SeenLight>,
+        passed: &mut Passed,
     ) -> Seen {
         let Some(ray) = usable(origin.as_dvec3(), direction.as_dvec3()) else {
-            lights.clear();
+            *passed = Passed::default();
             return Seen { hit: None, in_shade: false };
         };
-        let mut sight = Sight::new(&ray, sender, f64::from(tmax), lights);
+        let mut sight = Sight::new(&ray, sender, f64::from(tmax), passed);
         self.visit::<true>(&ray, f64::from(tmax), |meeting| {
             let prim = self.prim(meeting);
             sight.meet(meeting, prim, || counts(meeting, prim, &ray, accept));
@@ -95,7 +96,7 @@ impl<'a> Tracer<'a> {
         parts.into_iter().any(|part| part.may_be_met(&ray))
     }
 
-    /// Whether anything that casts shadows stands at a distance in `(0, tmax)`, in lengths of
+    /// Whether anything that casts shadows, panes too, stands at a distance in `(0, tmax)`, in lengths of
     /// `direction`. `accept` as for [`look`](Self::look). A ray that is not finite counts as blocked.
     pub fn occluded(
         &self,
@@ -104,71 +105,85 @@ impl<'a> Tracer<'a> {
         tmax: f32,
         accept: &impl Fn(u32, u32, Vec2) -> bool,
     ) -> bool {
-        self.occluded_by(origin, direction, tmax, accept, &|_| true)
+        let ray = (origin, direction, tmax);
+        self.transmitted(ray, accept, &|_| true, &|_| Rgb::ZERO) == Rgb::ZERO
     }
 
-    /// The same, of the prims alone that `casts` names.
-    pub fn occluded_by(
+    /// The share of light that passes the distances in `(0, tmax)`, in lengths of `direction`: the product of the
+    /// panes' tints, or none if anything else that `casts` names casts a shadow. A ray that is not finite is blocked.
+    pub fn transmitted(
         &self,
-        origin: Vec3,
-        direction: Vec3,
-        tmax: f32,
+        (origin, direction, tmax): (Vec3, Vec3, f32),
         accept: &impl Fn(u32, u32, Vec2) -> bool,
         casts: &impl Fn(Caster) -> bool,
-    ) -> bool {
+        tint: &impl Fn(&Hit) -> Rgb,
+    ) -> Rgb {
         match usable(origin.as_dvec3(), direction.as_dvec3()) {
-            Some(ray) => self.blocks(&ray, f64::from(tmax), accept, casts),
-            None => true,
+            Some(ray) => self.share(&ray, f64::from(tmax), accept, casts, tint),
+            None => Rgb::ZERO,
         }
     }
 
-    /// Whether anything that casts shadows stands between two points, neither of whose surfaces
-    /// counts. The exact way to ask whether a light sample is visible: no distance has to be shortened
-    /// by hand.
+    /// Whether anything that casts shadows, panes too, stands between two points, neither of whose surfaces
+    /// counts.
     pub fn occluded_between(
         &self,
         from: &Anchor,
         to: &Anchor,
         accept: &impl Fn(u32, u32, Vec2) -> bool,
     ) -> bool {
-        self.occluded_between_by(from, to, accept, &|_| true)
+        self.transmitted_between(from, to, accept, &|_| true, &|_| Rgb::ZERO) == Rgb::ZERO
     }
 
-    /// The same, of the prims alone that `casts` names.
-    pub fn occluded_between_by(
+    /// The share of light that passes [so](Self::transmitted) between two points, neither of whose surfaces counts.
+    /// The exact way to ask whether a light sample is visible: no distance has to be shortened by hand.
+    pub fn transmitted_between(
         &self,
         from: &Anchor,
         to: &Anchor,
         accept: &impl Fn(u32, u32, Vec2) -> bool,
         casts: &impl Fn(Caster) -> bool,
-    ) -> bool {
+        tint: &impl Fn(&Hit) -> Rgb,
+    ) -> Rgb {
         let direction = to.position - from.position;
         let start = from.origin_toward(direction).as_dvec3();
         let end = to.origin_toward(-direction).as_dvec3();
         match usable(start, end - start) {
-            Some(ray) => self.blocks(&ray, 1.0, accept, casts),
-            None => true,
+            Some(ray) => self.share(&ray, 1.0, accept, casts, tint),
+            None => Rgb::ZERO,
         }
     }
 
-    fn blocks(
+    fn share(
         &self,
         ray: &Ray,
         tmax: f64,
         accept: &impl Fn(u32, u32, Vec2) -> bool,
         casts: &impl Fn(Caster) -> bool,
-    ) -> bool {
-        let mut blocked = false;
+        tint: &impl Fn(&Hit) -> Rgb,
+    ) -> Rgb {
+        let (mut share, mut last) = (Rgb::ONE, None);
         self.visit::<false>(ray, tmax, |meeting| {
             let prim = self.prim(meeting);
             let caster = match &meeting.on {
                 On::Triangle { id, .. } => Caster::Instance(id.instance),
                 On::Sphere(sphere) => Caster::Sphere(sphere.light),
             };
-            blocked = prim.casts_shadow() && casts(caster) && counts(meeting, prim, ray, accept);
-            if blocked { -1.0 } else { tmax }
+            if prim.casts_shadow() && casts(caster) && counts(meeting, prim, ray, accept) {
+                share = match caster {
+                    Caster::Instance(row) if built_in::TRANSMISSION && prim.is_pane => {
+                        let before = last.replace((row, meeting.t));
+                        match before {
+                            Some(before) if is_one_meeting(ray, before, (row, meeting.t)) => share,
+                            _ => share * tint(&meeting.hit(ray, prim)),
+                        }
+                    }
+                    _ => Rgb::ZERO,
+                };
+            }
+            if share == Rgb::ZERO { -1.0 } else { tmax }
         });
-        blocked
+        share
     }
 
     /// Calls `met` with everything that a ray meets at a distance in `(0, tmax)`, near things roughly

@@ -87,18 +87,21 @@ fn flush(scene: &Scene, tilt: Quat, scale: f32) {
     let prepared = RayScene::new(scene, &pose);
     let tracer = prepared.for_pose(scene, &pose);
     let mut numbers = Numbers(24);
-    let mut lights = Vec::new();
+    let mut passed = Passed::default();
     for _ in 0..20 {
         let at = Vec3::new(numbers.next() * 0.6 - 0.3, numbers.next() * 0.6 - 0.3, 3.0);
         let to = tilt * at * scale;
         let below = tilt * Vec3::new(numbers.next() * 4.0 - 2.0, numbers.next() * 4.0 - 2.0, 0.0);
         let ray = (below * scale, to - below * scale, f32::INFINITY);
-        let seen = tracer.look(Sender::Surface, ray, &ALL, &mut lights);
+        let seen = tracer.look(Sender::Surface, ray, &ALL, &mut passed);
         let path = |hit: &Hit| match hit.surface {
             HitSurface::Triangle { instance, .. } => scene.instance_path(instance as usize),
             HitSurface::Sphere { .. } => panic!("there are no spheres"),
         };
-        assert_eq!(lights.iter().map(|light| path(&light.hit)).collect::<Vec<_>>(), ["/light"]);
+        assert_eq!(
+            passed.lights.iter().map(|light| path(&light.hit)).collect::<Vec<_>>(),
+            ["/light"]
+        );
         let hit = seen.hit.unwrap();
         assert_eq!(path(&hit), "/light");
         // What leaves it downwards leaves the ceiling, too.
@@ -107,8 +110,8 @@ fn flush(scene: &Scene, tilt: Quat, scale: f32) {
         // From above there is a ceiling, and no light.
         let above = to + tilt * Vec3::Z * scale;
         let ray = (above, to - above, f32::INFINITY);
-        let seen = tracer.look(Sender::Camera, ray, &ALL, &mut lights);
-        assert!(lights.is_empty());
+        let seen = tracer.look(Sender::Camera, ray, &ALL, &mut passed);
+        assert!(passed.lights.is_empty());
         let start = seen.hit.unwrap().anchor.origin_toward(-ray.1);
         assert!(!tracer.occluded(start, -ray.1, 0.9, &ALL));
         // A sample of the light arrives.
@@ -139,11 +142,11 @@ fn lights_in_one_place_are_all_seen() {
         let pose = scene.pose_at(0.0);
         let prepared = RayScene::new(&scene, &pose);
         let tracer = prepared.for_pose(&scene, &pose);
-        let mut lights = Vec::new();
+        let mut passed = Passed::default();
         let toward = tilt.as_quat() * Vec3::new(0.1, 0.3, 2.0);
         for sender in [Sender::Camera, Sender::Surface] {
-            tracer.look(sender, (Vec3::ZERO, toward, 9.0), &ALL, &mut lights);
-            assert_eq!(lights.len(), 3);
+            tracer.look(sender, (Vec3::ZERO, toward, 9.0), &ALL, &mut passed);
+            assert_eq!(passed.lights.len(), 3);
         }
     }
 }
@@ -159,10 +162,10 @@ fn a_light_behind_a_thin_wall_is_not_seen() {
             let pose = scene.pose_at(0.0);
             let prepared = RayScene::new(&scene, &pose);
             let toward = tilt.as_quat() * Vec3::new(0.1, 0.2, 2.0);
-            let mut lights = Vec::new();
+            let mut passed = Passed::default();
             let ray = (Vec3::ZERO, toward, f32::INFINITY);
-            prepared.for_pose(&scene, &pose).look(Sender::Surface, ray, &ALL, &mut lights);
-            assert!(lights.is_empty(), "{gap}");
+            prepared.for_pose(&scene, &pose).look(Sender::Surface, ray, &ALL, &mut passed);
+            assert!(passed.lights.is_empty(), "{gap}");
         }
     }
 }
@@ -213,12 +216,12 @@ fn who_sends_a_ray_decides_what_it_meets() {
             let prepared = RayScene::new(&scene, &pose);
             let tracer = prepared.for_pose(&scene, &pose);
             let Visibility { camera, reflections, shadows } = visibility;
-            let mut lights = Vec::new();
+            let mut passed = Passed::default();
             let mut look = |sender, from: Vec3, toward: Vec3| {
-                let seen = tracer.look(sender, (from, toward, 9.0), &ALL, &mut lights);
-                let near = lights.iter().filter(|light| light.hit.t < 1.5).count();
+                let seen = tracer.look(sender, (from, toward, 9.0), &ALL, &mut passed);
+                let near = passed.lights.iter().filter(|light| light.hit.t < 1.5).count();
                 let t = seen.hit.map_or(f32::INFINITY, |hit| hit.t);
-                (t < 1.5, near, lights.len() - near)
+                (t < 1.5, near, passed.lights.len() - near)
             };
             let (from, toward) = (Vec3::new(0.05, 0.07, 0.0), Vec3::Z);
             let (stops, passes) = ((true, 1, 0), (false, 0, 1));
@@ -256,10 +259,10 @@ fn an_unlit_lamp_is_not_there() {
         let pose = scene.pose_at(0.0);
         let prepared = RayScene::new(&scene, &pose);
         let tracer = prepared.for_pose(&scene, &pose);
-        let (from, mut lights) = (Vec3::new(0.05, 0.07, 0.0), Vec::new());
+        let (from, mut passed) = (Vec3::new(0.05, 0.07, 0.0), Passed::default());
         for sender in [Sender::Camera, Sender::Surface] {
-            let hit = tracer.look(sender, (from, Vec3::Z, 9.0), &ALL, &mut lights).hit;
-            assert!(hit.unwrap().t > 1.5 && lights.is_empty());
+            let hit = tracer.look(sender, (from, Vec3::Z, 9.0), &ALL, &mut passed).hit;
+            assert!(hit.unwrap().t > 1.5 && passed.lights.is_empty());
         }
         assert!(!tracer.occluded(from, Vec3::Z, 1.5, &ALL));
     }
@@ -307,15 +310,15 @@ fn a_ray_that_sees_a_light_may_meet_light() {
             let pose = scene.pose_at(time);
             let prepared = RayScene::new(&scene, &scene.pose_at(0.0));
             let tracer = prepared.for_pose(&scene, &pose);
-            let mut lights = Vec::new();
+            let mut passed = Passed::default();
             for _ in 0..4000 {
                 let (origin, direction) =
                     ((numbers.point() * 2.0 - 1.0) * scale, numbers.direction());
                 let ray = (origin, direction, f32::INFINITY);
-                tracer.look(Sender::Surface, ray, &ALL, &mut lights);
+                tracer.look(Sender::Surface, ray, &ALL, &mut passed);
                 let may = tracer.may_meet_light(origin, direction);
-                assert!(may || lights.is_empty(), "{scale}, {time}: {lights:?}");
-                seen += usize::from(!lights.is_empty());
+                assert!(may || passed.lights.is_empty(), "{scale}, {time}: {passed:?}");
+                seen += usize::from(!passed.lights.is_empty());
                 ruled_out += usize::from(!may);
             }
         }
