@@ -123,7 +123,7 @@ class Skinning:
             return points, normals
         try:
             posed = self._posed(binding, points, corners, normals, code)
-            if any(self._moved(binding, other) for other in self.frames.codes):
+            if any(self._moved(binding, other, points, posed[0]) for other in self.frames.codes):
                 why = f"deforming meshes have no carrier; the pose of frame {code:g} is used"
                 self.report.about("animation").warn(path, "skinned mesh that deforms", why)
         except (ValueError, np.linalg.LinAlgError) as error:
@@ -148,10 +148,18 @@ class Skinning:
             return found, None
         return found, _turn(binding, len(points), corners, normals, turned, space, code)
 
-    def _moved(self, binding: Binding, code: float) -> bool:
+    def _moved(self, binding: Binding, code: float, points: np.ndarray, posed: np.ndarray) -> bool:
         """Whether the pose at a time is another than the first frame's, by more than rounding."""
         first, now = binding.state(self.frames.first), binding.state(code)
-        return any(a.shape != b.shape or not np.allclose(a, b, rtol=1e-6, atol=1e-6) for a, b in zip(first, now, strict=True))
+        near = [
+            a.shape == b.shape and np.allclose(a, b, rtol=1e-6, atol=1e-6) for a, b in zip(first, now, strict=True)
+        ]
+        if not all(near[:2]):
+            return True
+        # Joints that move may be none that this mesh follows.
+        return not all(near) and not np.allclose(
+            posed, self._posed(binding, points, np.array([]), None, code)[0], rtol=0, atol=1e-6 * np.abs(posed).max(initial=0)
+        )
 
 
 def _as_placed(skeleton: Usd.Prim, mesh: Usd.Prim) -> Usd.Prim:

@@ -201,6 +201,12 @@ def test_what_deforms_is_named_and_what_is_held_is_not(export):
     assert "the pose of frame 1 is used" in moving.said()
     assert export(figure(mesh(SKIN)), "--frames", "1", "--strict").code == 0
     assert export(figure(mesh(SKIN), HELD), "--frames", "1-2", "--strict").code == 0
+    # It follows the joint that stands still, softly; another mesh follows the one that moves.
+    tip = "rotations.timeSamples = { 1: [(1, 0, 0, 0), (1, 0, 0, 0)], 2: [(1, 0, 0, 0), (0.8, 0, 0, 0.6)] }"
+    rooted = SKIN.replace("[1, 0, 0.5, 0.5, 0, 1, 1, 0, 0.4, 0.6, 0, 1]", "[1, 0, 0.5, 0, 1, 0, 1, 0, 0.4, 0, 1, 0]")
+    assert rooted != SKIN
+    apart = export(figure(mesh(rooted, "Root") + "\n" + mesh(SKIN), tip), "--frames", "1-2")
+    assert [w["path"] for w in apart.report["warnings"]] == ["/Figure/M"]
     shapes = export(figure(SHAPES, HELD, WEIGHTS), "--frames", "1-2")
     assert shapes.warned() == {"skinned mesh that deforms"}
 
