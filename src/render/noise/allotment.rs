@@ -5,6 +5,11 @@
 //! 1934). Noisy places are then noisier than others, but by far less than with as many samples
 //! everywhere. No place may have more than twice the error that is asked of the frame.
 //!
+//! A pixel's neighbours decide, since its own samples must not. Where light is rare in single pixels they are bad
+//! witnesses: they get the samples that the pixel lacks. How good they are is tested on all pixels together (leave-one-out
+//! cross-validation: a pixel's own halves against what its neighbours would give it), and a share of the samples is spread
+//! evenly, the larger the worse they are.
+//!
 //! Counts are those at which scrambled nets are good, powers of two in each half and half-way between.
 //! Which pixels have the one count or the next is decided by a fixed mask, so that no contour shows.
 
@@ -29,34 +34,66 @@ const WORST2: f64 = 4.0;
 /// In one pass a pixel's samples at most become so many times as many: its error is not known well
 /// enough for more.
 const GROWTH: f64 = 2.0;
+/// So finely is the share chosen that is spread evenly.
+const EVEN_STEPS: u32 = 8;
 
 impl Allotment {
     /// The samples that an error needs in all, each pixel's, as real numbers; pixels that cannot be
     /// judged get the most. `error` is asked of the frame.
     pub fn needed(&self, estimate: &Estimate, error: f64) -> Vec<f64> {
         let wanted = error * error;
-        let noisy: Vec<f64> = (0..estimate.pixels())
-            .filter(|&i| estimate.is_noisy(i) && !estimate.is_spoilt(i))
-            .map(|i| estimate.of_one_sample(i))
-            .filter(|r| r.is_finite())
-            .collect();
-        let count = |r: f64, scale: f64| self.clamp((scale * r.sqrt()).max(r / (WORST2 * wanted)));
+        let noisy = judged(estimate, |i| estimate.is_noisy(i));
         let enough = wanted * noisy.len() as f64;
-        let scale =
-            least_scale(|scale| noisy.iter().map(|&r| r / count(r, scale)).sum::<f64>() <= enough);
-        self.each(estimate, |_, r| count(r, scale))
+        let base = |r: f64, scale: f64| (scale * r.sqrt()).max(r / (WORST2 * wanted));
+        let least_scale_of = |evenly: f64| {
+            least_scale(|scale| {
+                let mix = Mix::of(&noisy, evenly, |r| base(r, scale));
+                let left = |pixel: &Judged| pixel.r / self.clamp(mix.count(base(pixel.r, scale)));
+                noisy.iter().map(left).sum::<f64>() <= enough
+            })
+        };
+        let scale = least_scale_of(0.0);
+        let evenly = self.even_share(&noisy, |r| base(r, scale));
+        let scale = if evenly > 0.0 { least_scale_of(evenly) } else { scale };
+        let mix = Mix::of(&noisy, evenly, |r| base(r, scale));
+        self.each(estimate, |_, r| self.clamp(mix.count(base(r, scale))))
     }
 
     /// The best use of so many samples in all, those that were taken counted.
     pub fn affordable(&self, estimate: &Estimate, samples: u64) -> Vec<f64> {
         let all = samples as f64;
-        let at = |scale: f64| {
-            let pixels =
-                self.each(estimate, |i, r| self.clamp(scale * r.sqrt()).max(estimate.samples(i)));
+        let judged = judged(estimate, |_| true);
+        let at = |scale: f64, evenly: f64| {
+            let mix = Mix::of(&judged, evenly, |r| scale * r.sqrt());
+            let pixels = self.each(estimate, |i, r| {
+                self.clamp(mix.count(scale * r.sqrt())).max(estimate.samples(i))
+            });
             (pixels.iter().sum::<f64>(), pixels)
         };
-        let scale = least_scale(|scale| at(scale).0 >= all);
-        at(scale).1
+        let scale = least_scale(|scale| at(scale, 0.0).0 >= all);
+        let evenly = self.even_share(&judged, |r| scale * r.sqrt());
+        let scale = match evenly > 0.0 {
+            true => least_scale(|scale| at(scale, evenly).0 >= all),
+            false => scale,
+        };
+        at(scale, evenly).1
+    }
+
+    /// The share of all samples that is best spread evenly, if the rest is as `base` says of the squared error of a
+    /// sample: with it the pixels' own halves expect the least error.
+    fn even_share(&self, pixels: &[Judged], base: impl Fn(f64) -> f64) -> f64 {
+        let shares = (0..=EVEN_STEPS).map(|step| f64::from(step) / f64::from(EVEN_STEPS));
+        let expected = |evenly: f64| {
+            let mix = Mix::of(pixels, evenly, &base);
+            let left = |pixel: &Judged| pixel.own / self.clamp(mix.count(base(pixel.r)));
+            pixels.iter().map(left).sum::<f64>()
+        };
+        let none = (0.0, f64::INFINITY);
+        let better = |best: (f64, f64), share: f64| {
+            let sum = expected(share);
+            if sum < best.1 { (share, sum) } else { best }
+        };
+        shares.fold(none, better).0
     }
 
     /// A count for each pixel, from the squared error of one sample; those without one get the most.
@@ -82,6 +119,42 @@ impl Allotment {
             next.max(now as u32)
         };
         needed.iter().enumerate().map(count).collect()
+    }
+}
+
+/// A pixel whose error can be judged.
+struct Judged {
+    /// The squared error that one sample would have, by the neighbours.
+    r: f64,
+    /// The same by the pixel's own halves.
+    own: f64,
+}
+
+/// The pixels that can be judged, of those that are asked about.
+fn judged(estimate: &Estimate, is_asked: impl Fn(usize) -> bool) -> Vec<Judged> {
+    let of = |i: usize| Judged { r: estimate.of_one_sample(i), own: estimate.own_of_one_sample(i) };
+    let asked = (0..estimate.pixels()).filter(|&i| is_asked(i) && !estimate.is_spoilt(i));
+    asked.map(of).filter(|pixel| pixel.r.is_finite() && pixel.own.is_finite()).collect()
+}
+
+/// Counts of which a share is spread evenly.
+struct Mix {
+    evenly: f64,
+    /// The mean of all counts.
+    mean: f64,
+}
+
+impl Mix {
+    fn of(pixels: &[Judged], evenly: f64, base: impl Fn(f64) -> f64) -> Mix {
+        let mean = match evenly > 0.0 {
+            true => pixels.iter().map(|pixel| base(pixel.r)).sum::<f64>() / pixels.len() as f64,
+            false => 0.0,
+        };
+        Mix { evenly, mean }
+    }
+
+    fn count(&self, base: f64) -> f64 {
+        base + self.evenly * (self.mean - base)
     }
 }
 
@@ -194,6 +267,38 @@ mod tests {
             let mean = needed.iter().sum::<f64>() / needed.len() as f64;
             let even = error_with(&estimate, &vec![mean; needed.len()]);
             prop_assert!(even >= reached * 0.999);
+        }
+
+        /// Wherever noise is, in places or in single pixels, and whatever their ratio: the pixels' own halves expect no
+        /// more error than of as many samples everywhere.
+        #[test]
+        fn samples_are_never_worse_spent_than_evenly(
+            log_noise in prop::collection::vec(-4.0..4.0f64, 36),
+            log_spots in 0.0..6.0f64,
+            apart in 2usize..12,
+            log_error in -3.0..-0.5f64,
+            is_asked in any::<bool>(),
+        ) {
+            let pixel = |i: usize| {
+                let (x, y) = (i % WIDTH, i / WIDTH);
+                let is_spot = x % apart == 0 && y % apart == 0;
+                let spot = if is_spot { log_spots } else { 0.0 };
+                let off = 10f64.powf(0.2 * log_noise[y / 4 * 6 + x / 4] + 0.2 * spot - 2.0);
+                Halves { counts: [8; 2], means: [10.0 * (-off).exp(), 10.0], ..Halves::default() }
+            };
+            let pixels: Vec<Halves> = (0..WIDTH * WIDTH).map(pixel).collect();
+            let estimate = Estimate::of(&pixels, WIDTH, Grey::below(10.0));
+            let allotment = Allotment { least: 1, most: 1 << 28 };
+            let counts = match is_asked {
+                true => allotment.needed(&estimate, 10f64.powf(log_error)),
+                false => allotment.affordable(&estimate, 1 << 20),
+            };
+            let left = |count: &dyn Fn(usize) -> f64| {
+                (0..estimate.pixels()).map(|i| estimate.own_of_one_sample(i) / count(i)).sum::<f64>()
+            };
+            let mean = counts.iter().sum::<f64>() / counts.len() as f64;
+            let (own, even) = (left(&|i| counts[i]), left(&|_| mean));
+            prop_assert!(own <= 1.05 * even, "{own} for {even}");
         }
 
         #[test]

@@ -138,6 +138,11 @@ impl Estimate {
         if sum.is_nan() { f64::INFINITY } else { sum }
     }
 
+    /// The same by the pixel's own halves alone: a rough number, of which only sums over many pixels tell something.
+    pub fn own_of_one_sample(&self, pixel: usize) -> f64 {
+        self.own[pixel]
+    }
+
     /// The pooled error of a pixel.
     pub fn error(&self, pixel: usize) -> f64 {
         (self.of_one_sample(pixel) / self.samples[pixel].max(1.0)).sqrt()
