@@ -2,7 +2,7 @@
 
 use super::path::{Inside, Integrator, PathScratch, TraceStats, Vertex};
 use super::picker::{LightPick, PickScratch, Wanted};
-use super::rays::{Anchor, Caster, Hit};
+use super::rays::{Anchor, Caster, Hit, Transmitted};
 use crate::light_tree::{Picked, Splitting};
 use crate::math::color::{Rgb, luminance};
 use crate::math::random::hash;
@@ -202,26 +202,28 @@ impl Integrator<'_> {
             Some(light) => (light.position - at.position).length(),
             None => f32::INFINITY,
         };
-        let share = match self.links.zip(incoming.shadow_set) {
-            None => self.unblocked(at, incoming, accept, &|_| true),
+        let Transmitted { share, leaves_at } = match self.links.zip(incoming.shadow_set) {
+            None => self.transmitted(at, incoming, accept, &|_| true),
             Some((links, set)) => {
-                self.unblocked(at, incoming, accept, &|caster| links.casts(set, caster))
+                self.transmitted(at, incoming, accept, &|caster| links.casts(set, caster))
             }
         };
         if share == Rgb::ZERO {
             return Rgb::ZERO;
         }
-        share * self.through(inside, at.position, direction, length)
+        // Between two points it is a fraction of the way.
+        let leaves_at = if length.is_finite() { leaves_at * length } else { leaves_at };
+        share * self.through((inside, leaves_at), at.position, direction, length)
     }
 
-    /// The share of light that the prims that `casts` names let through between a point and a light.
-    fn unblocked(
+    /// What of light gets from a light to a point past the prims that `casts` names.
+    fn transmitted(
         &self,
         at: &Anchor,
         incoming: &Incoming,
         accept: &impl Fn(u32, u32, Vec2) -> bool,
         casts: &impl Fn(Caster) -> bool,
-    ) -> Rgb {
+    ) -> Transmitted {
         let direction = incoming.direction;
         let tint = |pane: &Hit| self.surfaces.tint(pane, direction);
         match &incoming.from {
@@ -248,7 +250,7 @@ pub(super) fn another(u: Vec2, salt: u32, light: Picked) -> Vec2 {
 }
 
 /// The largest number below 1.
-const BELOW_ONE: f32 = 1.0 - f32::EPSILON / 2.0;
+pub(super) const BELOW_ONE: f32 = 1.0 - f32::EPSILON / 2.0;
 
 /// Veach's power heuristic with exponent 2, safe where squares would overflow.
 pub fn power_heuristic(own: f32, other: f32) -> f32 {

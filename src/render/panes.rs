@@ -8,6 +8,7 @@
 //!
 //! One search of the ray finds all panes before its end, however many, so nothing has to be bounded.
 
+use super::direct::BELOW_ONE;
 use super::path::{Inside, Integrator, Vertex};
 use super::rays::{Hit, Passed};
 use crate::math::color::Rgb;
@@ -37,11 +38,11 @@ impl Integrator<'_> {
     pub(super) fn at_end(
         &self,
         (origin, direction): (Vec3, Vec3),
-        inside: Inside,
+        filled: (Inside, f32),
         end: &Hit,
     ) -> Drawn {
-        let vertex = self.vertex_within(inside, end, -direction);
-        let weight = self.through(inside, origin, direction, end.t);
+        let vertex = self.vertex_within(filled, end, -direction);
+        let weight = self.through(filled, origin, direction, end.t);
         Drawn { vertex, weight, albedo: Rgb::ZERO }
     }
 
@@ -50,7 +51,7 @@ impl Integrator<'_> {
     pub(super) fn through_panes(
         &self,
         (origin, direction): (Vec3, Vec3),
-        inside: Inside,
+        filled: (Inside, f32),
         passed: &Passed,
         end: Option<Hit>,
         mut u: f32,
@@ -59,20 +60,20 @@ impl Integrator<'_> {
         let (mut share, mut sum, mut chosen) = (Rgb::ONE, 0.0, 0.0);
         let panes = passed.met().map(|pane| (pane.hit, pane.tint));
         for (hit, tint) in panes.chain(end.map(|hit| (hit, Rgb::ZERO))) {
-            if let Some(vertex) = self.vertex_within(inside, &hit, -direction) {
+            if let Some(vertex) = self.vertex_within(filled, &hit, -direction) {
                 let reflected = share * vertex.reflection.whole_albedo();
                 drawn.albedo += reflected;
-                let arriving = share * self.through(inside, origin, direction, hit.t);
+                let arriving = share * self.through(filled, origin, direction, hit.t);
                 let chance = (arriving * vertex.reflection.whole_albedo()).max_element();
                 sum += chance;
                 // A reservoir: each takes the place of those before it with its share of all so far.
                 let own = if chance > 0.0 { chance / sum } else { 0.0 };
                 if u < own {
-                    u /= own;
+                    u = (u / own).min(BELOW_ONE);
                     chosen = chance;
                     (drawn.vertex, drawn.weight) = (Some(vertex), arriving);
                 } else {
-                    u = (u - own) / (1.0 - own);
+                    u = ((u - own) / (1.0 - own)).min(BELOW_ONE);
                 }
             }
             share *= tint;

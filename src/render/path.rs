@@ -160,12 +160,15 @@ impl Integrator<'_> {
         let mut throughput = Rgb::ONE;
         let mut before: Option<Origin> = None;
         let mut inside: Inside = None;
+        // How many times as high radiance is here as where the path began.
+        let mut concentration = 1.0;
         for bounce in 0..=self.settings.depth {
             scratch.stats.rays += 1;
             let sender = if bounce == 0 { Sender::Camera } else { Sender::Surface };
             let mut passed = std::mem::take(&mut scratch.passed);
             let ray = (origin, direction, reach_m);
-            let Seen { hit, in_shade } = self.tracer.look(sender, ray, &accept, &mut passed);
+            let Seen { hit, in_shade, leaves_at } =
+                self.tracer.look(sender, ray, &accept, &mut passed);
             reach_m = f32::INFINITY;
             if built_in::TRANSMISSION
                 && bounce == 0
@@ -173,6 +176,7 @@ impl Integrator<'_> {
             {
                 inside = self.sides(hit, -direction)[0];
             }
+            let filled = (inside, leaves_at);
             let meets_panes = built_in::TRANSMISSION && !passed.panes.is_empty();
             if meets_panes {
                 self.tint_panes(&mut passed, direction);
@@ -193,12 +197,12 @@ impl Integrator<'_> {
                 }
             }
             for light in &passed.lights {
-                let arriving = throughput * self.through(inside, origin, direction, light.hit.t);
+                let arriving = throughput * self.through(filled, origin, direction, light.hit.t);
                 let arriving = arriving * passed.tint_of(light);
                 seen.add(bounce, self.emitted(&light.hit, direction, &before, arriving, scratch));
             }
             if hit.is_none() && !in_shade {
-                let arriving = self.through(inside, origin, direction, f32::INFINITY);
+                let arriving = self.through(filled, origin, direction, f32::INFINITY);
                 let arriving = throughput * arriving * passed.tint_of_sky();
                 let light = self.emitted_at_infinity(direction, &before, arriving, scratch);
                 seen.add(bounce, arriving * light);
@@ -206,10 +210,10 @@ impl Integrator<'_> {
             let first = passed.met().next().map_or(hit, |pane| Some(pane.hit));
             let drawn = match (meets_panes, hit) {
                 (false, None) => Drawn::default(),
-                (false, Some(hit)) => self.at_end((origin, direction), inside, &hit),
+                (false, Some(hit)) => self.at_end((origin, direction), filled, &hit),
                 (true, _) => {
                     let [u, ..] = sampler.next_4d();
-                    self.through_panes((origin, direction), inside, &passed, hit, u)
+                    self.through_panes((origin, direction), filled, &passed, hit, u)
                 }
             };
             scratch.passed = passed;
@@ -244,8 +248,12 @@ impl Integrator<'_> {
                 break;
             }
             throughput *= next.weight;
+            if vertex.is_beyond(next.wi) {
+                concentration *= vertex.reflection.concentration();
+            }
             if bounce >= SURE_BOUNCES {
-                let survival = throughput.max_element().min(0.95);
+                // Of the power, not of the radiance: what enters glass gets back its `eta^2` where it leaves.
+                let survival = (throughput * concentration).max_element().min(0.95);
                 if roulette >= survival {
                     break;
                 }
@@ -256,9 +264,7 @@ impl Integrator<'_> {
             before = Some(Origin { wanted, how, point, normal, bsdf_pdf: next.pdf });
             origin = vertex.anchor.origin_toward(next.wi);
             direction = next.wi;
-            if vertex.is_beyond(next.wi) {
-                inside = vertex.beyond;
-            }
+            inside = if vertex.is_beyond(next.wi) { vertex.beyond } else { vertex.here };
             if is_last && !self.may_find_light(origin, direction) {
                 break;
             }
@@ -292,16 +298,24 @@ impl Integrator<'_> {
         cells.find(point, normal, (hash(salt, CELL) >> 8) as f32 / 16_777_216.0)
     }
 
-    /// The share of light that fog or glass lets through along a stretch of a ray.
+    /// The share of light that fog or glass lets through along a stretch of a ray. It leaves the glass at some length
+    /// at the latest.
     pub(super) fn through(
         &self,
-        inside: Inside,
+        (inside, leaves_at): (Inside, f32),
         origin: Vec3,
         direction: Vec3,
         length: f32,
     ) -> Rgb {
         if let Some(absorption) = inside.filter(|_| built_in::TRANSMISSION) {
-            return (absorption * -length.min(f32::MAX)).exp();
+            let within = (absorption * -length.min(leaves_at).min(f32::MAX)).exp();
+            return match leaves_at < length {
+                true => {
+                    let (left, rest) = (origin + direction * leaves_at, length - leaves_at);
+                    within * self.through((None, f32::INFINITY), left, direction, rest)
+                }
+                false => within,
+            };
         }
         let through = |fog: &Fog| fog.transmittance(origin, direction, length);
         self.fog.as_ref().filter(|_| built_in::FOG).map_or(Rgb::ONE, through)

@@ -24,6 +24,8 @@ const LEAST_COSINE: f32 = 1e-3;
 
 /// Solid glass bends light at least like this: without any bend, directions of 32 bits could not tell a lobe.
 const LEAST_IOR: f32 = 1.001;
+/// And at most like this: the square of what is larger could vanish in 32 bits.
+const MOST_IOR: f32 = 1e3;
 
 /// Whether a material is a pane: thin glass, so smooth that light passes it straight. Its GGX alpha is at most
 /// [`ALPHA_MIN`] everywhere, which is that of a roughness of 0.0316.
@@ -73,10 +75,7 @@ struct At<'a> {
 impl<'a> Surfaces<'a> {
     /// The surfaces of a scene as it stands in `pose`.
     pub fn new(scene: &'a Scene, pose: &'a Pose) -> Surfaces<'a> {
-        let is_solid = |material: &Material| {
-            material.transmission.is_some_and(|passes| passes.volume.is_some())
-        };
-        let has_volumes = scene.materials.iter().any(is_solid);
+        let has_volumes = scene.materials.iter().any(Material::is_solid_glass);
         Surfaces { scene, pose, plain: Material::default(), has_volumes }
     }
 
@@ -181,7 +180,7 @@ impl<'a> Surfaces<'a> {
         let (transmission, passage) = match &material.transmission {
             Some(passes) if built_in::TRANSMISSION => {
                 let passage = match passes.volume {
-                    Some(_) => Passage::Solid(material.ior.max(LEAST_IOR)),
+                    Some(_) => Passage::Solid(material.ior.clamp(LEAST_IOR, MOST_IOR)),
                     None if is_pane(material) => Passage::Straight,
                     None => Passage::Thin,
                 };

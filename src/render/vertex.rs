@@ -54,9 +54,15 @@ impl Integrator<'_> {
         if hit.anchor.normal.dot(wo) >= 0.0 { [None, volume] } else { [volume, None] }
     }
 
-    /// The vertex at a hit of a path that came through something.
-    pub(super) fn vertex_within(&self, inside: Inside, hit: &Hit, wo: Vec3) -> Option<Vertex> {
+    /// The vertex at a hit of a path that came through something, which it left at some length at the latest.
+    pub(super) fn vertex_within(
+        &self,
+        (inside, leaves_at): (Inside, f32),
+        hit: &Hit,
+        wo: Vec3,
+    ) -> Option<Vertex> {
         let vertex = self.vertex(hit, wo)?;
+        let inside = inside.filter(|_| hit.t <= leaves_at);
         // A wall without thickness has the same on both sides.
         let beyond = if vertex.here == vertex.beyond { inside } else { vertex.beyond };
         Some(Vertex { here: inside, beyond, ..vertex })

@@ -47,7 +47,8 @@ impl Integrator<'_> {
             } else {
                 self.tint_panes(&mut passed, direction);
                 let [u, ..] = sampler.next_4d();
-                self.through_panes((origin, direction), None, &passed, hit, u).vertex
+                self.through_panes((origin, direction), (None, f32::INFINITY), &passed, hit, u)
+                    .vertex
             };
             let Some(vertex) = vertex else { break };
             let [lobe, bu, bv, _] = sampler.next_4d();

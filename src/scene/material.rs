@@ -141,6 +141,11 @@ impl Material {
         uses.into_iter().chain(coat.into_iter().flatten()).flatten()
     }
 
+    /// Whether it is the surface of solid glass.
+    pub fn is_solid_glass(&self) -> bool {
+        self.transmission.is_some_and(|passes| passes.volume.is_some())
+    }
+
     /// Whether any light can leave this surface of its own.
     pub fn emits(&self) -> bool {
         self.emission_nits.max_element() > 0.0

@@ -128,8 +128,7 @@ impl Requirements {
             needs.glossy += usize::from(material.is_glossy());
             needs.coats += usize::from(material.coat.is_some());
             needs.glass += usize::from(material.transmission.is_some());
-            let volume = material.transmission.and_then(|passes| passes.volume);
-            needs.solid_glass += usize::from(volume.is_some());
+            needs.solid_glass += usize::from(material.is_solid_glass());
         }
         needs.glossy += usize::from(scene.meshes.iter().any(|mesh| mesh.material.is_none()));
         needs.fog = usize::from(scene.medium.is_some());

@@ -2,8 +2,15 @@
 
 use crate::files::{File, lamp, png};
 use candelabra::math::color::Rgb;
-use candelabra::scene::{Material, Transmission, Volume};
+use candelabra::scene::{Category, Material, Transmission, Volume};
 use serde_json::{Value, json};
+
+/// Gives the lamp a back.
+fn closed(file: &mut File) {
+    let bytes: Vec<u8> = [0u16, 1, 2, 0, 2, 1].iter().flat_map(|i| i.to_le_bytes()).collect();
+    let indices = file.array(&bytes, 5123, 6, "SCALAR");
+    file.json["meshes"][0]["primitives"][0]["indices"] = json!(indices);
+}
 
 /// A material with some extensions, and what is noted of it.
 fn material(extensions: Value) -> (Material, String) {
@@ -13,6 +20,7 @@ fn material(extensions: Value) -> (Material, String) {
     file.add("textures", json!({"source": 0}));
     let uv = file.floats(&[0.0, 0.0, 1.0, 0.0, 0.0, 1.0], "VEC2");
     file.attribute("TEXCOORD_0", uv);
+    closed(&mut file);
     file.json["materials"][0] = json!({"extensions": extensions});
     let scene = file.load().unwrap();
     let told: Vec<String> = scene.notes.iter().map(|note| note.text.clone()).collect();
@@ -76,6 +84,8 @@ fn glass_that_cannot_be_is_mended() {
     let whole = json!({"transmissionFactor": 1});
     let (passes, told) = glass(whole.clone(), json!({"thicknessFactor": "thick"}));
     assert!(passes.unwrap().volume.is_none() && told.contains("cannot be read"), "{told}");
+    let (passes, told) = glass(whole.clone(), json!({"thicknessFactor": -1}));
+    assert!(passes.unwrap().volume.is_none() && told.contains("negative thickness"), "{told}");
     let absent = json!({"transmissionFactor": 1, "transmissionTexture": {"index": 7}});
     let (passes, told) = glass(absent, json!({}));
     assert!(passes.unwrap().factor_texture.is_none());
@@ -93,4 +103,36 @@ fn glass_that_cannot_be_is_mended() {
             "{told}"
         );
     }
+}
+
+/// The primitives of a mesh close each other; those of another mesh do not, though they share the material.
+#[test]
+fn solid_glass_that_is_not_closed_is_thin() {
+    let mut file: File = lamp();
+    file.json["materials"][0] = json!({"extensions": {
+        "KHR_materials_transmission": {"transmissionFactor": 1},
+        "KHR_materials_volume": {"thicknessFactor": 1},
+    }});
+    // A tetrahedron without common vertices, but for the face that the lamp is.
+    let [o, x, y, z] = [[0.0_f32, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [-0.0, 0.0, 1.0]];
+    let walls: Vec<f32> = [o, z, x, o, y, z, x, z, y].into_iter().flatten().collect();
+    let positions = file.floats(&walls, "VEC3");
+    let face = file.json["meshes"][0]["primitives"][0].clone();
+    let walls = json!({"attributes": {"POSITION": positions}, "material": 0});
+    let mesh = |name: &str, primitives: &[&Value]| json!({"name": name, "primitives": primitives});
+    file.json["meshes"] =
+        json!(
+            [mesh("whole", &[&face, &walls]), mesh("window", &[&face]), mesh("tent", &[&walls]),]
+        );
+    file.json["nodes"] = json!([0, 1, 2].map(|row| json!({"name": row.to_string(), "mesh": row})));
+    file.json["scenes"][0]["nodes"] = json!([0, 1, 2]);
+    let scene = file.load().unwrap();
+    let is_solid = |mesh: u32| scene.material_of(mesh).unwrap().is_solid_glass();
+    let solid: Vec<bool> = scene.instances.iter().map(|instance| is_solid(instance.mesh)).collect();
+    assert_eq!(solid, [true, true, false, false]);
+    assert!(scene.materials.iter().all(|material| material.transmission.is_some()));
+    assert_eq!(scene.materials.len(), 2);
+    let told = scene.notes.iter().find(|note| note.text.contains("not closed")).unwrap();
+    let named = ["whole", "window", "tent"].map(|name| told.text.contains(name));
+    assert!(told.category == Category::Materials && named == [false, true, true], "{told}");
 }

@@ -1,10 +1,11 @@
 //! Glass that is rough or solid.
 
-use crate::stage::{Stage, at, direct, facing, glow, lambert, milk, solid};
+use crate::linking::{Kept, Lamp, link};
+use crate::stage::{Stage, aimed, at, direct, facing, glow, lambert, milk, solid};
 use crate::statistics::{Estimate, assert_even};
 use crate::strategies::{Way, render};
 use candelabra::render::{LightStrategy, RenderSettings};
-use candelabra::scene::{LightKind, Material};
+use candelabra::scene::{LightKind, Material, Visibility};
 use glam::{DVec3, Vec3};
 
 /// A camera that sees almost one ray.
@@ -35,8 +36,8 @@ fn clear_solid_glass_is_not_seen_in_a_white_dome() {
     }
 }
 
-/// A lamp in the middle of a ball of glass, seen straight on: what Fresnel and Beer let through of its radiance, which is
-/// higher in the glass.
+/// A lamp in the middle of a ball of glass, seen straight on: what Fresnel and Beer let through of its radiance, which
+/// is higher in the glass.
 #[test]
 fn a_lamp_with_area_inside_solid_glass_is_found() {
     let radiance = 5.0;
@@ -92,6 +93,72 @@ fn glass_takes_light_by_beers_law() {
         let off = (beauty - (-0.8 * absorption).exp()).abs().max_element();
         assert!(off < 2e-3, "{beauty}");
     }
+}
+
+/// Two walls of glass that hardly bends, the front one at `z` and the other below it, over a floor at the origin.
+fn over_a_floor(glass: Option<&Material>, [z, below]: [f64; 2]) -> Stage {
+    let mut stage = Stage::default();
+    stage.quad([9.0; 2], lambert(Vec3::splat(0.5)), facing(DVec3::ZERO, DVec3::Z));
+    for (place, front) in [(DVec3::Z * z, DVec3::Z), (DVec3::Z * below, -DVec3::Z)] {
+        if let Some(glass) = glass {
+            stage.quad([9.0; 2], glass.clone(), facing(place, place + front));
+        }
+    }
+    let aside = DVec3::new(0.3, 0.1, 0.0);
+    stage.look(aside + DVec3::Z * 2.0, aside, 1e-4);
+    stage
+}
+
+#[track_caller]
+fn assert_share(what: &str, seen: &Stage, clear: &Stage, expected: Vec3) {
+    let mean = |stage: &Stage| {
+        Estimate::of_picture(&stage.render(&RenderSettings { depth: 2, ..direct(2, 256) })).mean
+    };
+    let (seen, clear) = (mean(seen), mean(clear));
+    let off = (seen / clear - expected.as_dvec3()).abs().max_element();
+    assert!(clear.min_element() > 0.0 && off < 5e-3, "{what}: {seen} of {clear}, {expected}");
+}
+
+/// Light that glass does not block is absorbed as far as the glass goes.
+#[test]
+fn light_past_the_wall_of_glass_is_absorbed_inside_alone() {
+    let absorption = Vec3::new(0.1, 0.4, 1.0);
+    let glass = Material { specular: 0.0, ..solid(1.0, absorption) };
+    let lamps = [
+        LightKind::Distant { irradiance_lux: Vec3::ONE, angle_rad: 0.0 },
+        LightKind::Point { intensity_cd: Vec3::ONE },
+    ];
+    for kind in lamps {
+        let picture = |glass: Option<&Material>| {
+            let mut stage = over_a_floor(glass, [0.8, -0.1]);
+            let place = DVec3::new(0.3, 0.1, 5.0);
+            stage.light(kind.clone(), aimed(place, place - DVec3::Z));
+            if glass.is_some() {
+                let kept = [Kept::Shadows(Lamp::Light(0), vec![Some(1), Some(2)])];
+                link(&mut stage.scene, &kept);
+            }
+            stage
+        };
+        let expected = (-1.6 * absorption).exp();
+        assert_share(&format!("{kind:?}"), &picture(Some(&glass)), &picture(None), expected);
+    }
+}
+
+/// Who enters glass whose other wall is hidden from reflected rays leaves it all the same.
+#[test]
+fn a_path_leaves_glass_by_a_wall_that_it_does_not_meet() {
+    let absorption = Vec3::new(0.2, 1.0, 3.0);
+    let glass = Material { specular: 0.0, ..solid(1.0, absorption) };
+    let picture = |glass: Option<&Material>| {
+        let mut stage = over_a_floor(glass, [0.8, 0.4]);
+        stage.light(LightKind::Point { intensity_cd: Vec3::ONE }, at(DVec3::new(-1.0, 0.1, 0.2)));
+        for wall in stage.scene.instances.iter_mut().skip(1) {
+            wall.visibility = Visibility { reflections: false, ..Visibility::ALL };
+        }
+        stage
+    };
+    let expected = (-0.4 * absorption).exp();
+    assert_share("a hidden wall", &picture(Some(&glass)), &picture(None), expected);
 }
 
 /// A sheet of rough glass before a lamp lights a floor alike, however the lamp is picked.

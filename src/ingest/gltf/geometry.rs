@@ -3,6 +3,7 @@
 use super::accessors::Accessor;
 use super::attributes::Attributes;
 use super::document::label;
+use super::glass;
 use super::materials::{Materials, uv_sets};
 use super::posing::{Arrays, Hung, Pose, Poses};
 use super::{Output, Source};
@@ -24,6 +25,8 @@ const MOST_UV_SETS: u32 = 16;
 pub(super) struct Meshes {
     compiled: HashMap<(usize, Pose), Rc<[Option<Compiled>]>>,
     materials: Materials,
+    /// Thin glass in the place of solid glass, by materials of the scene.
+    thin: HashMap<u32, u32>,
 }
 
 /// A primitive in the scene.
@@ -44,7 +47,7 @@ pub(super) struct Vertices {
 
 impl Meshes {
     pub(super) fn new(source: &Source) -> Meshes {
-        Meshes { compiled: HashMap::new(), materials: Materials::new(source) }
+        Meshes { compiled: HashMap::new(), materials: Materials::new(source), thin: HashMap::new() }
     }
 
     /// The scene's meshes for a mesh of the file in a pose.
@@ -61,6 +64,7 @@ impl Meshes {
         }
         let row = &source.document.meshes[number.value()];
         let object = label("mesh", number.value(), row.name.as_deref());
+        let first = output.scene.meshes.len();
         let mut compiled = Vec::with_capacity(row.primitives.len());
         for (i, primitive) in row.primitives.iter().enumerate() {
             let object = match row.primitives.len() {
@@ -74,6 +78,8 @@ impl Meshes {
                 Compiled { mesh: output.scene.meshes.len() as u32 - 1, hung }
             }));
         }
+        let all = first..output.scene.meshes.len();
+        glass::thin_if_open(output, &mut self.thin, all, &object);
         let bytes = pose.byte_length() + (row.primitives.len() * size_of::<Compiled>()) as u64;
         output.budget.take(bytes, || object)?;
         let compiled: Rc<[Option<Compiled>]> = compiled.into();

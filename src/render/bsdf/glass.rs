@@ -6,8 +6,9 @@
 //! *Solid* glass reflects and refracts at each microfacet (Walter et al. 2007, "Microfacet Models for Refraction
 //! through Rough Surfaces"), and reflects all where nothing can leave. Fresnel's term is Schlick's, at the larger of
 //! the angles on either side. What bounces between microfacets is lost: nothing where it is smooth, at a roughness of
-//! 0.5 and straight on 1 % from outside and 7 % from inside, much more where it is rougher or at grazing angles. Radiance that enters a medium of the relative index `eta` is `eta^2` times as high there; the
-//! BSDF is that of paths from the eye, so it divides by `eta^2` where such a path enters.
+//! 0.5 and straight on 1 % from outside and 7 % from inside, much more where it is rougher or at grazing angles.
+//! Radiance that enters a medium of the relative index `eta` is `eta^2` times as high there; the BSDF is that of paths
+//! from the eye, so it divides by `eta^2` where such a path enters.
 
 use super::ggx;
 use crate::math::color::Rgb;

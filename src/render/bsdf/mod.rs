@@ -1,4 +1,5 @@
-//! How a surface reflects: Lambert below GGX, glTF's metallic-roughness model, perhaps below a clear coat, perhaps glass.
+//! How a surface reflects: Lambert below GGX, glTF's metallic-roughness model, perhaps below a clear coat, perhaps
+//! glass.
 //!
 //! A [`Bsdf`] is one shading point, with textures already looked up into a [`SurfaceSample`]; a
 //! [`Reflection`] is that point seen from one direction, `wo`.
@@ -16,8 +17,8 @@
 //! diffuse = base / pi * (1 - albedo of f_gloss toward wo)
 //! ```
 //!
-//! Where light passes, with the share `t` of `KHR_materials_transmission`, `(1 - t) diffuse + t f_glass` takes the place
-//! of `diffuse`; where the glass is solid, that of `f_gloss + diffuse`.
+//! Where light passes, with the share `t` of `KHR_materials_transmission`, `(1 - t) diffuse + t f_glass` takes the
+//! place of `diffuse`; where the glass is solid, that of `f_gloss + diffuse`.
 //!
 //! The coat is `KHR_materials_clearcoat`'s: `c` its strength, an index of 1.5, a roughness of its own. Where it is
 //! smooth, its albedo is Fresnel's term at `wo`, by which the extension darkens what is below.
@@ -376,6 +377,14 @@ impl Reflection {
     #[inline]
     pub fn transmits(&self) -> bool {
         built_in::TRANSMISSION && self.glass.probability > 0.0
+    }
+
+    /// How many times as high radiance is beyond the surface as here: `eta^2`.
+    pub fn concentration(&self) -> f32 {
+        match self.glass.passage {
+            Passage::Solid(eta) => eta * eta,
+            _ => 1.0,
+        }
     }
 
     /// Whether a direction is on the side of the shading normal, not beyond the surface.

@@ -43,7 +43,7 @@ pub use anchor::Anchor;
 pub use meeting::{Hit, HitSurface};
 pub use prim::Sender;
 pub use sight::{Passed, Seen, SeenLight, SeenPane};
-pub use tracer::{Caster, Tracer};
+pub use tracer::{Caster, Tracer, Transmitted};
 
 use crate::scene::{Instance, LightKind, Mesh, Pose, Scene};
 use blas::{Blas, TriangleId};

@@ -3,7 +3,7 @@
 use super::super::surface::is_pane;
 use crate::math::built_in;
 use crate::math::directions::mirrors;
-use crate::scene::{AlphaMode, Pose, Scene, Visibility};
+use crate::scene::{AlphaMode, Material, Pose, Scene, Visibility};
 
 /// Who sent a ray, which decides what it meets.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -36,6 +36,8 @@ pub(super) struct Prim {
     pub is_cutout: bool,
     /// Rays pass it, tinted.
     pub is_pane: bool,
+    /// Solid glass.
+    is_solid: bool,
     /// Its transform mirrors.
     pub mirrors: bool,
     visibility: Visibility,
@@ -54,6 +56,7 @@ impl Prim {
             rank,
             is_cutout: material.is_some_and(|m| m.alpha_mode != AlphaMode::Opaque),
             is_pane: built_in::TRANSMISSION && material.is_some_and(is_pane),
+            is_solid: built_in::TRANSMISSION && material.is_some_and(Material::is_solid_glass),
             mirrors: mirrors(&pose.world(instance.node)),
             visibility: instance.visibility,
             shines: scene.rgb_of_instance(row, pose).max_element() > 0.0,
@@ -67,6 +70,7 @@ impl Prim {
             rank,
             is_cutout: false,
             is_pane: false,
+            is_solid: false,
             mirrors: false,
             visibility: scene.lights[row as usize].visibility,
             shines: scene.rgb_of_light(row, pose).max_element() > 0.0,
@@ -88,6 +92,12 @@ impl Prim {
     /// Whether it stops rays from a surface to a light.
     pub fn casts_shadow(&self) -> bool {
         self.visibility.shadows
+    }
+
+    /// Whether a ray that passes it without meeting it leaves solid glass.
+    #[inline]
+    pub fn is_left(&self, is_met: bool, front: impl FnOnce() -> bool) -> bool {
+        built_in::TRANSMISSION && self.is_solid && !is_met && !front()
     }
 
     /// What it is to a ray that meets its front or its back. A prim that casts no shadow is nothing

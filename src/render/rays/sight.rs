@@ -14,10 +14,11 @@
 //! end counts, by itself, as it does for a ray between two points; one that is one with a light does not cover it.
 
 use super::anchor::Anchor;
-use super::meeting::{Hit, Meeting};
+use super::meeting::{Hit, Meeting, On};
 use super::prim::{Prim, Role, Sender};
 use super::triangles::Ray;
 use crate::math::color::Rgb;
+use glam::DVec3;
 
 /// How far apart two surfaces may be, relative to their coordinates, and still be one. Two copies of
 /// one plane, each rounded to 32 bits in its own way, are less than half of this apart.
@@ -49,6 +50,46 @@ pub struct SeenPane {
     t: f64,
     /// The ray meets it; if not, it tints only what lights send along the ray.
     is_met: bool,
+    /// The ray meets its front.
+    is_front: bool,
+    /// Of the triangle that is met, in the space of its set.
+    corners: [DVec3; 3],
+}
+
+impl SeenPane {
+    /// `None` if it is no triangle.
+    pub(super) fn of(meeting: &Meeting, ray: &Ray, prim: &Prim, is_met: bool) -> Option<SeenPane> {
+        let On::Triangle { corners, .. } = meeting.on else { return None };
+        let (hit, is_front) = (meeting.hit(ray, prim), meeting.is_front(ray, prim));
+        Some(SeenPane { hit, tint: Rgb::ONE, t: meeting.t, is_met, is_front, corners })
+    }
+
+    /// Whether two meetings are one: a ray that goes through an edge or a corner may meet all triangles around it.
+    /// What lies close together without a common corner, or is left where the other is entered, are two.
+    fn is_one_with(&self, other: &SeenPane) -> bool {
+        let instance = |pane: &SeenPane| pane.hit.surface.order().1;
+        let shares_corner = || self.corners.iter().any(|corner| other.corners.contains(corner));
+        instance(self) == instance(other) && self.is_front == other.is_front && shares_corner()
+    }
+}
+
+/// Puts panes into the order of the ray, each once. How they were found does not matter.
+pub(super) fn order_panes(ray: &Ray, panes: &mut Vec<SeenPane>) {
+    panes.sort_unstable_by(|a, b| {
+        a.t.total_cmp(&b.t).then_with(|| a.hit.surface.order().cmp(&b.hit.surface.order()))
+    });
+    let mut kept = 0;
+    for at in 0..panes.len() {
+        let pane = panes[at];
+        let tolerance = tolerance_at(ray, pane.t) / LEAST_COSINE;
+        let mut near =
+            panes[..kept].iter().rev().take_while(|before| pane.t - before.t <= tolerance);
+        if !near.any(|before| pane.is_one_with(before)) {
+            panes[kept] = pane;
+            kept += 1;
+        }
+    }
+    panes.truncate(kept);
 }
 
 /// What a ray passes on its way, near things first. Reused from ray to ray.
@@ -96,6 +137,8 @@ pub struct Seen {
     pub hit: Option<Hit>,
     /// What the ray does not meet, but a ray to a light would, stands before the end.
     pub in_shade: bool,
+    /// Where the ray passes the back of solid glass that it does not meet, before the end; infinite if it does not.
+    pub leaves_at: f32,
 }
 
 /// What a ray has seen so far.
@@ -107,12 +150,8 @@ pub(super) struct Sight<'a> {
     /// The nearest other surface.
     second: f64,
     shade: f64,
+    leaves_at: f64,
     passed: &'a mut Passed,
-}
-
-/// Whether two meetings with a pane are one: a ray that goes through an edge may meet the triangles on both sides of it.
-pub(super) fn is_one_meeting(ray: &Ray, a: (u32, f64), b: (u32, f64)) -> bool {
-    a.0 == b.0 && (a.1 - b.1).abs() <= tolerance_at(ray, a.1) / LEAST_COSINE
 }
 
 /// How far apart along the normal surfaces at a distance may be and still be one, in lengths of the direction.
@@ -131,8 +170,8 @@ fn leaving_all(hit: Hit) -> Hit {
 impl<'a> Sight<'a> {
     pub fn new(ray: &'a Ray, sender: Sender, tmax: f64, passed: &'a mut Passed) -> Self {
         passed.clear();
-        let (second, shade) = (f64::INFINITY, f64::INFINITY);
-        Sight { ray, sender, tmax, nearest: None, second, shade, passed }
+        let (second, shade, leaves_at) = (f64::INFINITY, f64::INFINITY, f64::INFINITY);
+        Sight { ray, sender, tmax, nearest: None, second, shade, leaves_at, passed }
     }
 
     /// Beyond this nothing is of interest.
@@ -153,15 +192,18 @@ impl<'a> Sight<'a> {
             let front = meeting.is_front(self.ray, prim);
             (prim.role(self.sender, front), prim.shines_toward(front))
         };
-        if role == Role::Nothing || !counts() {
+        let t = meeting.t;
+        let is_there = role != Role::Nothing && counts();
+        if prim.is_left(role == Role::Surface && is_there, || meeting.is_front(self.ray, prim)) {
+            self.leaves_at = self.leaves_at.min(t);
+        }
+        if !is_there {
             return;
         }
-        let t = meeting.t;
         // Without shadows a prim is nothing but its light, and does not tint.
         let is_pane = prim.is_pane && role != Role::Light;
         if is_pane {
-            let (hit, is_met) = (meeting.hit(self.ray, prim), role == Role::Surface);
-            self.passed.panes.push(SeenPane { hit, tint: Rgb::ONE, t, is_met });
+            self.passed.panes.extend(SeenPane::of(meeting, self.ray, prim, role == Role::Surface));
         } else if role == Role::Shade {
             self.shade = self.shade.min(t);
             return;
@@ -198,7 +240,7 @@ impl<'a> Sight<'a> {
         self.passed.lights.sort_unstable_by(|a, b| {
             a.t.total_cmp(&b.t).then_with(|| a.hit.surface.order().cmp(&b.hit.surface.order()))
         });
-        let flush = self.order_panes(end, tolerance);
+        let flush = self.settle_panes(end, tolerance);
         let hit = self.nearest.map(|(nearest, prim)| {
             let light = self.passed.lights.iter().find(|light| light.is_surface);
             let hit = light.map_or_else(|| nearest.hit(self.ray, &prim), |light| light.hit);
@@ -211,11 +253,12 @@ impl<'a> Sight<'a> {
             }
             leaving_all(hit)
         });
-        Seen { hit, in_shade: self.shade < end }
+        let leaves_at = if self.leaves_at < end { self.leaves_at as f32 } else { f32::INFINITY };
+        Seen { hit, in_shade: self.shade < end, leaves_at }
     }
 
     /// Sorts out the panes. Whether any is one with the end.
-    fn order_panes(&mut self, end: f64, tolerance: f64) -> bool {
+    fn settle_panes(&mut self, end: f64, tolerance: f64) -> bool {
         if self.passed.panes.is_empty() {
             return false;
         }
@@ -223,11 +266,7 @@ impl<'a> Sight<'a> {
         let beside = |t: f64| tolerance_at(ray, t) / LEAST_COSINE;
         let Passed { lights, panes } = &mut *self.passed;
         panes.retain(|pane| pane.t < end);
-        panes.sort_unstable_by(|a, b| {
-            a.t.total_cmp(&b.t).then_with(|| a.hit.surface.order().cmp(&b.hit.surface.order()))
-        });
-        let meeting = |pane: &SeenPane| (pane.hit.surface.order().1, pane.t);
-        panes.dedup_by(|next, pane| is_one_meeting(ray, meeting(pane), meeting(next)));
+        order_panes(ray, panes);
         for at in 1..panes.len() {
             if panes[at].t - panes[at - 1].t <= beside(panes[at].t) {
                 panes[at - 1].hit = leaving_all(panes[at - 1].hit);

@@ -4,7 +4,7 @@ use super::blas::search_limit;
 use super::meeting::{Meeting, On};
 use super::placing::{Item, Placing};
 use super::prim::{Prim, Sender};
-use super::sight::{Passed, Seen, Sight, is_one_meeting};
+use super::sight::{Passed, Seen, SeenPane, Sight, order_panes};
 use super::triangles::{Ray, barycentric};
 use super::wide_bvh::BoxRay;
 use super::{Anchor, Hit, RayScene};
@@ -30,6 +30,20 @@ struct Prims {
     instances: Vec<Prim>,
     /// By light; only those of spheres are looked at.
     lights: Vec<Prim>,
+}
+
+/// What of light gets along a ray.
+#[derive(Clone, Copy, Debug)]
+pub struct Transmitted {
+    /// The product of the panes' tints, or none if anything else casts a shadow.
+    pub share: Rgb,
+    /// Where the ray passes the back of solid glass that does not block it, in lengths of its direction; infinite if
+    /// it does not.
+    pub leaves_at: f32,
+}
+
+impl Transmitted {
+    const NOTHING: Transmitted = Transmitted { share: Rgb::ZERO, leaves_at: f32::INFINITY };
 }
 
 /// A prim that may cast a shadow.
@@ -78,7 +92,7 @@ impl<'a> Tracer<'a> {
     ) -> Seen {
         let Some(ray) = usable(origin.as_dvec3(), direction.as_dvec3()) else {
             *passed = Passed::default();
-            return Seen { hit: None, in_shade: false };
+            return Seen { hit: None, in_shade: false, leaves_at: f32::INFINITY };
         };
         let mut sight = Sight::new(&ray, sender, f64::from(tmax), passed);
         self.visit::<true>(&ray, f64::from(tmax), |meeting| {
@@ -106,21 +120,21 @@ impl<'a> Tracer<'a> {
         accept: &impl Fn(u32, u32, Vec2) -> bool,
     ) -> bool {
         let ray = (origin, direction, tmax);
-        self.transmitted(ray, accept, &|_| true, &|_| Rgb::ZERO) == Rgb::ZERO
+        self.transmitted(ray, accept, &|_| true, &|_| Rgb::ZERO).share == Rgb::ZERO
     }
 
-    /// The share of light that passes the distances in `(0, tmax)`, in lengths of `direction`: the product of the
-    /// panes' tints, or none if anything else that `casts` names casts a shadow. A ray that is not finite is blocked.
+    /// What of light passes the distances in `(0, tmax)`, in lengths of `direction`, if what `casts` names casts
+    /// shadows. A ray that is not finite is blocked.
     pub fn transmitted(
         &self,
         (origin, direction, tmax): (Vec3, Vec3, f32),
         accept: &impl Fn(u32, u32, Vec2) -> bool,
         casts: &impl Fn(Caster) -> bool,
         tint: &impl Fn(&Hit) -> Rgb,
-    ) -> Rgb {
+    ) -> Transmitted {
         match usable(origin.as_dvec3(), direction.as_dvec3()) {
-            Some(ray) => self.share(&ray, f64::from(tmax), accept, casts, tint),
-            None => Rgb::ZERO,
+            Some(ray) => self.along(&ray, f64::from(tmax), accept, casts, tint),
+            None => Transmitted::NOTHING,
         }
     }
 
@@ -132,10 +146,10 @@ impl<'a> Tracer<'a> {
         to: &Anchor,
         accept: &impl Fn(u32, u32, Vec2) -> bool,
     ) -> bool {
-        self.transmitted_between(from, to, accept, &|_| true, &|_| Rgb::ZERO) == Rgb::ZERO
+        self.transmitted_between(from, to, accept, &|_| true, &|_| Rgb::ZERO).share == Rgb::ZERO
     }
 
-    /// The share of light that passes [so](Self::transmitted) between two points, neither of whose surfaces counts.
+    /// What of light passes [so](Self::transmitted) between two points, neither of whose surfaces counts.
     /// The exact way to ask whether a light sample is visible: no distance has to be shortened by hand.
     pub fn transmitted_between(
         &self,
@@ -144,46 +158,53 @@ impl<'a> Tracer<'a> {
         accept: &impl Fn(u32, u32, Vec2) -> bool,
         casts: &impl Fn(Caster) -> bool,
         tint: &impl Fn(&Hit) -> Rgb,
-    ) -> Rgb {
+    ) -> Transmitted {
         let direction = to.position - from.position;
         let start = from.origin_toward(direction).as_dvec3();
         let end = to.origin_toward(-direction).as_dvec3();
         match usable(start, end - start) {
-            Some(ray) => self.share(&ray, 1.0, accept, casts, tint),
-            None => Rgb::ZERO,
+            Some(ray) => self.along(&ray, 1.0, accept, casts, tint),
+            None => Transmitted::NOTHING,
         }
     }
 
-    fn share(
+    fn along(
         &self,
         ray: &Ray,
         tmax: f64,
         accept: &impl Fn(u32, u32, Vec2) -> bool,
         casts: &impl Fn(Caster) -> bool,
         tint: &impl Fn(&Hit) -> Rgb,
-    ) -> Rgb {
-        let (mut share, mut last) = (Rgb::ONE, None);
+    ) -> Transmitted {
+        let (mut is_blocked, mut leaves_at, mut panes) = (false, f64::INFINITY, Vec::new());
         self.visit::<false>(ray, tmax, |meeting| {
             let prim = self.prim(meeting);
             let caster = match &meeting.on {
                 On::Triangle { id, .. } => Caster::Instance(id.instance),
                 On::Sphere(sphere) => Caster::Sphere(sphere.light),
             };
-            if prim.casts_shadow() && casts(caster) && counts(meeting, prim, ray, accept) {
-                share = match caster {
-                    Caster::Instance(row) if built_in::TRANSMISSION && prim.is_pane => {
-                        let before = last.replace((row, meeting.t));
-                        match before {
-                            Some(before) if is_one_meeting(ray, before, (row, meeting.t)) => share,
-                            _ => share * tint(&meeting.hit(ray, prim)),
-                        }
-                    }
-                    _ => Rgb::ZERO,
-                };
+            let is_met = prim.casts_shadow() && casts(caster) && counts(meeting, prim, ray, accept);
+            if is_met {
+                let mut pane =
+                    if prim.is_pane { SeenPane::of(meeting, ray, prim, true) } else { None };
+                if let Some(pane) = &mut pane {
+                    pane.tint = tint(&pane.hit);
+                }
+                let pane = pane.filter(|pane| pane.tint != Rgb::ZERO);
+                is_blocked = pane.is_none();
+                panes.extend(pane);
+            } else if prim.is_left(is_met, || meeting.is_front(ray, prim)) {
+                leaves_at = leaves_at.min(meeting.t);
             }
-            if share == Rgb::ZERO { -1.0 } else { tmax }
+            if is_blocked { -1.0 } else { tmax }
         });
-        share
+        if is_blocked {
+            return Transmitted::NOTHING;
+        }
+        // In the order of the ray, as `look` finds them: the two ways to find light must add up.
+        order_panes(ray, &mut panes);
+        let share = panes.iter().fold(Rgb::ONE, |share, pane| share * pane.tint);
+        Transmitted { share, leaves_at: leaves_at as f32 }
     }
 
     /// Calls `met` with everything that a ray meets at a distance in `(0, tmax)`, near things roughly

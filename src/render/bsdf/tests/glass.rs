@@ -175,3 +175,29 @@ fn smooth_glass_obeys_snell() {
         }
     }
 }
+
+/// What the density of radiance takes where a path enters glass, it gives back where the path leaves: without it no
+/// light is made or lost.
+#[test]
+fn weights_times_the_concentration_are_shares_of_power() {
+    for ior in [1.001, 1.5, 2.4, 1e3] {
+        for eta in [ior, 1.0 / ior] {
+            let sample = SurfaceSample {
+                transmission: 1.0,
+                passage: Passage::Solid(eta),
+                dielectric_f0: Rgb::ZERO,
+                dielectric_f90: 0.0,
+                ..dielectric(1.0, 0.0)
+            };
+            let reflection = upright(&sample).toward(Vec3::Z);
+            let passed = points(256)
+                .filter_map(|(lobe, u)| reflection.sample(lobe, u))
+                .filter(|sample| !reflection.is_above(sample.wi));
+            let shares: Vec<f32> =
+                passed.map(|sample| sample.weight.x * reflection.concentration()).collect();
+            assert!(!shares.is_empty(), "{eta}");
+            let off = shares.iter().map(|share| (share - 1.0).abs()).fold(0.0, f32::max);
+            assert!(off < 0.02, "{eta}: off by {off}");
+        }
+    }
+}

@@ -1,7 +1,7 @@
 //! What a ray sees where surfaces share a place, and of prims that some rays do not meet.
 
 use super::*;
-use crate::scene::Visibility;
+use crate::scene::{Transmission, Visibility};
 
 /// A square about the origin that faces -Z, at the height that is given.
 fn panel(half: f32, z: f32) -> Mesh {
@@ -324,4 +324,102 @@ fn a_ray_that_sees_a_light_may_meet_light() {
         }
     }
     assert!(seen > 100 && ruled_out > 12_000, "{seen} saw a light, {ruled_out} were ruled out");
+}
+
+/// What half-tinting panes let through of a ray, as a ray that looks and as one that asks for a light, from either end.
+fn halved(tracer: &Tracer, from: Vec3, to: Vec3) -> Vec<f32> {
+    let half = |_: &Hit| Rgb::splat(0.5);
+    let mut passed = Passed::default();
+    let mut shares = Vec::new();
+    for (from, to) in [(from, to), (to, from)] {
+        let ray = (from, to - from, 1.0);
+        tracer.look(Sender::Surface, ray, &ALL, &mut passed);
+        passed.panes.iter_mut().for_each(|pane| pane.tint = Rgb::splat(0.5));
+        shares.push(passed.tint_of_sky().x);
+        shares.push(tracer.transmitted(ray, &ALL, &|_| true, &half).share.x);
+        let ends = [from, to].map(Anchor::free);
+        let between = tracer.transmitted_between(&ends[0], &ends[1], &ALL, &|_| true, &half);
+        shares.push(between.share.x);
+    }
+    shares
+}
+
+/// A mesh that is all of glass.
+fn panes(quads: &[[Vec3; 4]], triangles: &[usize]) -> Mesh {
+    let all: Vec<[Vec3; 3]> =
+        quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
+    glowing(mesh(&triangles.iter().map(|&i| all[i]).collect::<Vec<_>>()))
+}
+
+fn of_panes(meshes: Vec<Mesh>) -> Scene {
+    let mut scene =
+        named(meshes.into_iter().map(|mesh| ("/panes", mesh, Trs::default())).collect());
+    let transmission = Some(Transmission { factor: 1.0, factor_texture: None, volume: None });
+    scene.materials = vec![Material { transmission, roughness: 0.0, ..Default::default() }];
+    scene
+}
+
+#[test]
+fn panes_of_one_mesh_are_one_only_where_they_meet() {
+    let mut numbers = Numbers(31);
+    for scale in [1e-3_f32, 1.0, 1e3] {
+        // Far out, the gaps are less than what is taken to be one surface.
+        let quad = |x: f32| {
+            [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)]
+                .map(|(y, z)| Vec3::new(1000.0 + x, y, z) * scale)
+        };
+        let walls = [0.0, 0.02, 0.04].map(quad);
+        let orders = [[0, 1, 2, 3, 4, 5], [5, 2, 0, 4, 3, 1], [2, 4, 0, 1, 5, 3]];
+        for order in orders {
+            let mesh = panes(&walls, &order);
+            let between = panes(&[quad(0.01)], &[0, 1]);
+            let scenes = [
+                (vec![mesh.clone()], 0.125),
+                (vec![mesh.clone(), between.clone()], 0.0625),
+                (vec![between, mesh], 0.0625),
+            ];
+            for (meshes, expected) in scenes {
+                let scene = of_panes(meshes);
+                let pose = scene.pose_at(0.0);
+                let prepared = RayScene::new(&scene, &pose);
+                let tracer = prepared.for_pose(&scene, &pose);
+                // On the diagonals, straight, and anywhere.
+                let straight =
+                    [0.25, -0.5].map(|y| [-0.5, 0.5].map(|x| Vec3::new(1000.0 + x, y, y)));
+                let anywhere = (0..20).map(|_| {
+                    [-0.5, 0.5]
+                        .map(|x| Vec3::new(1000.0 + x, numbers.next() - 0.5, numbers.next() - 0.5))
+                });
+                for [from, to] in straight.into_iter().chain(anywhere) {
+                    for share in halved(&tracer, from * scale, to * scale) {
+                        assert_eq!(share, expected, "scale {scale}, {from} to {to}");
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Near the edges of a sheet far out, a ray enters one face and leaves another that has a corner of it.
+#[test]
+fn a_ray_through_the_edge_of_a_sheet_passes_two_faces() {
+    let corner = |x: f32, y: f32, z: f32| Vec3::new(1000.0 + x, y, z);
+    let (near, far) = (0.0, 0.0625);
+    let [a, b, c, d] = [(-1.0, -1.0), (-1.0, 1.0), (1.0, 1.0), (1.0, -1.0)]
+        .map(|(y, z)| [corner(near, y, z), corner(far, y, z)]);
+    let sides = [(a, b), (b, c), (c, d), (d, a)].map(|(a, b)| [a[1], b[1], b[0], a[0]]);
+    let faces = [[a[0], b[0], c[0], d[0]], [d[1], c[1], b[1], a[1]]];
+    let all: Vec<[Vec3; 4]> = faces.into_iter().chain(sides).collect();
+    let scene = of_panes(vec![panes(&all, &(0..12).collect::<Vec<_>>())]);
+    let pose = scene.pose_at(0.0);
+    let prepared = RayScene::new(&scene, &pose);
+    let tracer = prepared.for_pose(&scene, &pose);
+    for z in [-0.3, 0.1, 0.6] {
+        // Enters 5 mm from the edge, and leaves the side 5 mm behind the face.
+        let (from, to) = (corner(-0.5, 0.5, z), corner(0.5, 1.5, z));
+        let aside = Vec3::Y * -0.0078125;
+        for share in halved(&tracer, from + aside, to + aside) {
+            assert_eq!(share, 0.25, "at {z}");
+        }
+    }
 }
