@@ -3,7 +3,7 @@
 //!
 //! A [`Bsdf`] is one shading point, with textures already looked up into a [`SurfaceSample`]; a
 //! [`Reflection`] is that point seen from one direction, `wo`.
-//! It reflects on the side of its frame's normal alone, and [glass](glass) lets light through; it knows nothing of
+//! It reflects on the side of its frame's normal alone, and glass lets light through; it knows nothing of
 //! materials, of emission or of the geometric normal (a caller that must not leak light through
 //! bent normals compares `wi` with the geometric normal itself).
 //!
