@@ -34,6 +34,8 @@ const WORST2: f64 = 4.0;
 /// In one pass a pixel's samples at most become so many times as many: its error is not known well
 /// enough for more.
 const GROWTH: f64 = 2.0;
+/// Pixels that one thread sums.
+const CHUNK: usize = 1 << 14;
 /// So finely is the share chosen that is spread evenly.
 const EVEN_STEPS: u32 = 8;
 
@@ -49,7 +51,7 @@ impl Allotment {
             least_scale(|scale| {
                 let mix = Mix::of(&noisy, evenly, |r| base(r, scale));
                 let left = |pixel: &Judged| pixel.r / self.clamp(mix.count(base(pixel.r, scale)));
-                noisy.iter().map(left).sum::<f64>() <= enough
+                sum(&noisy, left) <= enough
             })
         };
         let scale = least_scale_of(0.0);
@@ -81,12 +83,12 @@ impl Allotment {
 
     /// The share of all samples that is best spread evenly, if the rest is as `base` says of the squared error of a
     /// sample: with it the pixels' own halves expect the least error.
-    fn even_share(&self, pixels: &[Judged], base: impl Fn(f64) -> f64) -> f64 {
+    fn even_share(&self, pixels: &[Judged], base: impl Fn(f64) -> f64 + Sync) -> f64 {
         let shares = (0..=EVEN_STEPS).map(|step| f64::from(step) / f64::from(EVEN_STEPS));
         let expected = |evenly: f64| {
             let mix = Mix::of(pixels, evenly, &base);
             let left = |pixel: &Judged| pixel.own / self.clamp(mix.count(base(pixel.r)));
-            pixels.iter().map(left).sum::<f64>()
+            sum(pixels, left)
         };
         let none = (0.0, f64::INFINITY);
         let better = |best: (f64, f64), share: f64| {
@@ -137,6 +139,12 @@ fn judged(estimate: &Estimate, is_asked: impl Fn(usize) -> bool) -> Vec<Judged> 
     asked.map(of).filter(|pixel| pixel.r.is_finite() && pixel.own.is_finite()).collect()
 }
 
+/// A sum over pixels in parallel, in an order that threads do not change.
+fn sum(pixels: &[Judged], of: impl Fn(&Judged) -> f64 + Sync) -> f64 {
+    let parts = pixels.par_chunks(CHUNK).map(|part| part.iter().map(&of).sum::<f64>());
+    parts.collect::<Vec<_>>().iter().sum()
+}
+
 /// Counts of which a share is spread evenly.
 struct Mix {
     evenly: f64,
@@ -145,9 +153,9 @@ struct Mix {
 }
 
 impl Mix {
-    fn of(pixels: &[Judged], evenly: f64, base: impl Fn(f64) -> f64) -> Mix {
+    fn of(pixels: &[Judged], evenly: f64, base: impl Fn(f64) -> f64 + Sync) -> Mix {
         let mean = match evenly > 0.0 {
-            true => pixels.iter().map(|pixel| base(pixel.r)).sum::<f64>() / pixels.len() as f64,
+            true => sum(pixels, |pixel| base(pixel.r)) / pixels.len() as f64,
             false => 0.0,
         };
         Mix { evenly, mean }
