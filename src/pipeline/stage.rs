@@ -12,6 +12,7 @@
 
 use super::{Event, Strict, Watch};
 use crate::scene::SourceFile;
+use crate::store::open_regular;
 use clap::Args;
 use std::env;
 use std::ffi::{OsStr, OsString};
@@ -116,7 +117,7 @@ pub enum StageError {
         /// Why.
         cause: io::Error,
     },
-    /// The stage is not there, or is no file.
+    /// The stage is not there, or is no regular file.
     #[error("{}: cannot be read: {cause}; check the path", scene.display())]
     NoScene {
         /// The stage.
@@ -170,7 +171,7 @@ impl ExportedStage {
         watch: &dyn Watch,
     ) -> Result<ExportedStage, StageError> {
         let no_scene = |cause| StageError::NoScene { scene: source.into(), cause };
-        std::fs::File::open(source).map_err(no_scene)?;
+        open_regular(source).map_err(no_scene)?;
         let exporter = exporter(source)?;
         let no_folder = |cause| StageError::NoFolder { scene: source.into(), cause };
         let folder = tempfile::Builder::new().prefix("candelabra-").tempdir().map_err(no_folder)?;

@@ -226,14 +226,19 @@ fn a_missing_python_or_exporter_is_named_with_the_remedy() {
     assert!(stage.left().is_empty() && stage.left_no_trace());
 }
 
-/// It is told before any Python is looked for.
+/// It is told before any Python is looked for, and nobody waits for a pipe.
 #[test]
-fn a_stage_that_is_not_there_is_named() {
+fn a_stage_that_is_no_file_is_named() {
     let stage = Stage::with("echo 'error: python3 lacks the package pxr' >&2; exit 1");
-    let ended = end(&mut stage.command(RENDER, &format!("gone.usda -o a.exr {QUICK}")));
-    assert_eq!(ended.code, Some(1), "{}", ended.err);
-    assert!(ended.err.contains("gone.usda: cannot be read"), "{}", ended.err);
-    assert!(!ended.err.contains("pxr"), "{}", ended.err);
+    fs::create_dir(stage.shot.path("folder.usd")).unwrap();
+    let pipe = std::process::Command::new("mkfifo").arg(stage.shot.path("pipe.usdc")).status();
+    assert!(pipe.unwrap().success());
+    for name in ["gone.usda", "folder.usd", "pipe.usdc"] {
+        let ended = end(&mut stage.command(RENDER, &format!("{name} -o a.exr {QUICK}")));
+        assert_eq!(ended.code, Some(1), "{}", ended.err);
+        assert!(ended.err.contains(&format!("{name}: cannot be read")), "{}", ended.err);
+        assert!(!ended.err.contains("pxr"), "{}", ended.err);
+    }
 }
 
 #[test]
