@@ -5,10 +5,11 @@
 //! 1934). Noisy places are then noisier than others, but by far less than with as many samples
 //! everywhere. No place may have more than twice the error that is asked of the frame.
 //!
-//! A pixel's neighbours decide, since its own samples must not. Where light is rare in single pixels they are bad
-//! witnesses: they get the samples that the pixel lacks. How good they are is tested on all pixels together (leave-one-out
-//! cross-validation: a pixel's own halves against what its neighbours would give it), and a share of the samples is spread
-//! evenly, the larger the worse they are.
+//! A pixel's neighbours decide, since its own samples must not. Where light is rare in single pixels, neighbours do not
+//! predict a pixel's noise: they get the samples that it lacks. How well they predict is told by leave-one-out
+//! cross-validation over the frame: each pixel's own halves against the count that its neighbours give it. The share of
+//! samples that leaves the least error by that is spread evenly, also over the places that may have no more than twice
+//! the error.
 //!
 //! Counts are those at which scrambled nets are good, powers of two in each half and half-way between.
 //! Which pixels have the one count or the next is decided by a fixed mask, so that no contour shows.
@@ -44,34 +45,38 @@ impl Allotment {
     /// judged get the most. `error` is asked of the frame.
     pub fn needed(&self, estimate: &Estimate, error: f64) -> Vec<f64> {
         let wanted = error * error;
-        let noisy = judged(estimate, |i| estimate.is_noisy(i));
-        let enough = wanted * noisy.len() as f64;
+        let pixels = judged(estimate);
+        let is_noisy = |pixel: &&Judged| pixel.is_noisy;
+        let enough = wanted * pixels.iter().filter(is_noisy).count() as f64;
         let base = |r: f64, scale: f64| (scale * r.sqrt()).max(r / (WORST2 * wanted));
         let least_scale_of = |evenly: f64| {
             least_scale(|scale| {
-                let mix = Mix::of(&noisy, evenly, |r| base(r, scale));
-                let left = |pixel: &Judged| pixel.r / self.clamp(mix.count(base(pixel.r, scale)));
-                sum(&noisy, left) <= enough
+                let mix = Mix::of(&pixels, evenly, |r| base(r, scale));
+                let left = |pixel: &Judged| match pixel.is_noisy {
+                    true => pixel.r / self.clamp(mix.count(base(pixel.r, scale))),
+                    false => 0.0,
+                };
+                sum(&pixels, left) <= enough
             })
         };
         // The best share depends on the scale, and the scale on the share. What is left of the error is convex in the
         // share, so one that is at least the best is no worse than all evenly.
         let (mut evenly, mut scale) = (0.0, least_scale_of(0.0));
         loop {
-            let best = self.even_share(&noisy, |r| base(r, scale));
+            let best = self.even_share(&pixels, |r| base(r, scale));
             if best <= evenly {
                 break;
             }
             (evenly, scale) = (best, least_scale_of(best));
         }
-        let mix = Mix::of(&noisy, evenly, |r| base(r, scale));
+        let mix = Mix::of(&pixels, evenly, |r| base(r, scale));
         self.each(estimate, |_, r| self.clamp(mix.count(base(r, scale))))
     }
 
     /// The best use of so many samples in all, those that were taken counted.
     pub fn affordable(&self, estimate: &Estimate, samples: u64) -> Vec<f64> {
         let all = samples as f64;
-        let judged = judged(estimate, |_| true);
+        let judged = judged(estimate);
         let at = |scale: f64, evenly: f64| {
             let mix = Mix::of(&judged, evenly, |r| scale * r.sqrt());
             let pixels = self.each(estimate, |i, r| {
@@ -119,7 +124,7 @@ impl Allotment {
     }
 
     /// The counts of the next pass towards what is needed: never fewer than there are, and not many more
-    /// at once. `columns` and `origin` place the pixels in the whole picture.
+    /// at once.
     pub fn next(&self, estimate: &Estimate, needed: &[f64]) -> Counts {
         let count = |(i, &needed): (usize, &f64)| {
             let now = estimate.samples(i);
@@ -137,13 +142,19 @@ struct Judged {
     r: f64,
     /// The same by the pixel's own halves.
     own: f64,
+    /// It counts in the frame's error.
+    is_noisy: bool,
 }
 
-/// The pixels that can be judged, of those that are asked about.
-fn judged(estimate: &Estimate, is_asked: impl Fn(usize) -> bool) -> Vec<Judged> {
-    let of = |i: usize| Judged { r: estimate.of_one_sample(i), own: estimate.own_of_one_sample(i) };
-    let asked = (0..estimate.pixels()).filter(|&i| is_asked(i) && !estimate.is_spoilt(i));
-    asked.map(of).filter(|pixel| pixel.r.is_finite() && pixel.own.is_finite()).collect()
+/// The pixels that can be judged.
+fn judged(estimate: &Estimate) -> Vec<Judged> {
+    let of = |i: usize| Judged {
+        r: estimate.of_one_sample(i),
+        own: estimate.own_of_one_sample(i),
+        is_noisy: estimate.is_noisy(i),
+    };
+    let sound = (0..estimate.pixels()).filter(|&i| !estimate.is_spoilt(i));
+    sound.map(of).filter(|pixel| pixel.r.is_finite() && pixel.own.is_finite()).collect()
 }
 
 /// A sum over pixels in parallel, in an order that threads do not change.
@@ -284,18 +295,21 @@ mod tests {
             prop_assert!(even >= reached * 0.999);
         }
 
-        /// Wherever noise is, in places or in single pixels, and whatever their ratio: the pixels' own halves expect no
-        /// more error than of as many samples everywhere.
+        /// Wherever noise is, in places or in single pixels, whatever their ratio, and if a part of the picture has none:
+        /// the pixels' own halves expect no more error than of as many samples everywhere.
         #[test]
         fn samples_are_never_worse_spent_than_evenly(
             log_noise in prop::collection::vec(-4.0..4.0f64, 36),
             log_spots in 0.0..6.0f64,
             apart in 2usize..12,
             log_error in -3.0..-0.5f64,
-            is_asked in any::<bool>(),
+            (is_asked, sky) in (any::<bool>(), 0..WIDTH - 8),
         ) {
             let pixel = |i: usize| {
                 let (x, y) = (i % WIDTH, i / WIDTH);
+                if y < sky {
+                    return Halves { counts: [8; 2], means: [10.0; 2], ..Halves::default() };
+                }
                 let is_spot = x % apart == 0 && y % apart == 0;
                 let spot = if is_spot { log_spots } else { 0.0 };
                 let off = 10f64.powf(0.2 * log_noise[y / 4 * 6 + x / 4] + 0.2 * spot - 2.0);
