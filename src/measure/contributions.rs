@@ -3,7 +3,8 @@
 use crate::light_tree::Picked;
 use crate::math::color::luminance;
 use crate::render::direct::power_heuristic;
-use crate::render::path::{Integrator, Vertex};
+use crate::render::path::Integrator;
+use crate::render::vertex::Vertex;
 use glam::Vec2;
 use std::collections::HashMap;
 

@@ -6,7 +6,8 @@
 use super::contributions::reflected;
 use crate::light_tree::{LightTree, NoSuchFrame, Picked};
 use crate::render::RenderDelegate;
-use crate::render::path::{Integrator, Vertex};
+use crate::render::path::Integrator;
+use crate::render::vertex::Vertex;
 use rayon::prelude::*;
 
 /// Points along a side of the square lattice over a dome or a sun. An emitter has one, its middle.

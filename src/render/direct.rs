@@ -1,8 +1,9 @@
 //! Next-event estimation: light from the lights that are picked for a point of a surface.
 
-use super::path::{Inside, Integrator, PathScratch, TraceStats, Vertex};
+use super::path::{Integrator, PathScratch, TraceStats};
 use super::picker::{LightPick, PickScratch, Wanted};
 use super::rays::{Anchor, Caster, Hit, Transmitted};
+use super::vertex::{Inside, Vertex};
 use crate::light_tree::{Picked, Splitting};
 use crate::math::color::{Rgb, luminance};
 use crate::math::random::hash;

@@ -8,7 +8,7 @@
 //! |---|---|
 //! | [`delegate`] | what is done once for a shot, and what for each frame? |
 //! | `frame_times` | when does the camera see a frame? |
-//! | [`path`], `vertex`, `walk` | how does light get from a lamp to the eye, and where are its vertices? |
+//! | [`path`], [`vertex`], `walk` | how does light get from a lamp to the eye, and where are its vertices? |
 //! | [`direct`], [`fog`] | what do picked lights give a surface, what a stretch of fog? |
 //! | `panes` | what becomes of a path that meets thin glass? |
 //! | [`links`] | which lights light a surface, and what casts their shadows? |
@@ -60,7 +60,7 @@ pub mod png;
 pub mod rays;
 pub mod settings;
 pub mod surface;
-mod vertex;
+pub mod vertex;
 mod walk;
 
 pub use crop::{CropError, Window};

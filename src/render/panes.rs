@@ -9,8 +9,9 @@
 //! One search of the ray finds all panes before its end, however many, so nothing has to be bounded.
 
 use super::direct::BELOW_ONE;
-use super::path::{Inside, Integrator, Vertex};
+use super::path::Integrator;
 use super::rays::{Hit, Passed};
+use super::vertex::{Inside, Vertex};
 use crate::math::color::Rgb;
 use glam::Vec3;
 

@@ -17,6 +17,7 @@ use super::picker::{LightPicker, PickScratch, Site, Wanted};
 use super::rays::{Hit, HitSurface, Passed, Seen, Sender, Tracer};
 use super::settings::RenderSettings;
 use super::surface::Surfaces;
+use super::vertex::{Inside, Vertex};
 use crate::emitter::{EmitterHit, InfiniteLight, PosedEmitters};
 use crate::light_tree::learned::Cells;
 use crate::light_tree::{Cell, Picked, Receiver, Splitting};
@@ -25,8 +26,6 @@ use crate::math::color::Rgb;
 use crate::math::random::{Sampler, hash};
 use crate::scene::Visibility;
 use glam::{Vec2, Vec3};
-
-pub use super::vertex::{Inside, Vertex};
 
 /// Bounces before Russian roulette may end a path.
 const SURE_BOUNCES: u32 = 3;

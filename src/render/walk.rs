@@ -1,8 +1,9 @@
 //! Walks: the vertices of paths, without light.
 
 use super::camera::CameraRay;
-use super::path::{Integrator, Vertex};
+use super::path::Integrator;
 use super::rays::{Passed, Sender};
+use super::vertex::Vertex;
 use crate::math::random::Sampler;
 use glam::Vec2;
 

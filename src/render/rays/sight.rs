@@ -64,6 +64,11 @@ impl SeenPane {
         Some(SeenPane { hit, tint: Rgb::ONE, t: meeting.t, is_met, is_front, corners })
     }
 
+    /// The same with a tint that depends on where it is.
+    pub(super) fn tinted(self, tint: impl Fn(&Hit) -> Rgb) -> SeenPane {
+        SeenPane { tint: tint(&self.hit), ..self }
+    }
+
     /// Whether two meetings are one: a ray that goes through an edge or a corner may meet all triangles around it.
     /// What lies close together without a common corner, or is left where the other is entered, are two.
     fn is_one_with(&self, other: &SeenPane) -> bool {
@@ -124,7 +129,7 @@ impl Passed {
         self.panes.iter().fold(Rgb::ONE, |share, pane| share * pane.tint)
     }
 
-    fn clear(&mut self) {
+    pub(super) fn clear(&mut self) {
         self.lights.clear();
         self.panes.clear();
     }

@@ -91,7 +91,7 @@ impl<'a> Tracer<'a> {
         passed: &mut Passed,
     ) -> Seen {
         let Some(ray) = usable(origin.as_dvec3(), direction.as_dvec3()) else {
-            *passed = Passed::default();
+            passed.clear();
             return Seen { hit: None, in_shade: false, leaves_at: f32::INFINITY };
         };
         let mut sight = Sight::new(&ray, sender, f64::from(tmax), passed);
@@ -185,15 +185,11 @@ impl<'a> Tracer<'a> {
             };
             let is_met = prim.casts_shadow() && casts(caster) && counts(meeting, prim, ray, accept);
             if is_met {
-                let mut pane =
-                    if prim.is_pane { SeenPane::of(meeting, ray, prim, true) } else { None };
-                if let Some(pane) = &mut pane {
-                    pane.tint = tint(&pane.hit);
-                }
-                let pane = pane.filter(|pane| pane.tint != Rgb::ZERO);
-                is_blocked = pane.is_none();
+                let pane = prim.is_pane.then(|| SeenPane::of(meeting, ray, prim, true)).flatten();
+                let pane = pane.map(|pane| pane.tinted(tint));
+                is_blocked = pane.is_none_or(|pane| pane.tint == Rgb::ZERO);
                 panes.extend(pane);
-            } else if prim.is_left(is_met, || meeting.is_front(ray, prim)) {
+            } else if prim.is_left(false, || meeting.is_front(ray, prim)) {
                 leaves_at = leaves_at.min(meeting.t);
             }
             if is_blocked { -1.0 } else { tmax }
