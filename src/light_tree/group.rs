@@ -121,8 +121,15 @@ impl Group {
         unused.any(|lane| bytemuck::bytes_of(&self.lane(lane)) != [0; size_of::<Node>()])
     }
 
+    /// Whether every lane that is used sends light in every direction.
     #[inline(always)]
-    fn decode<const ENDLESS: bool>(&self) -> Lanes {
+    fn is_round(&self) -> bool {
+        let of = |lane| node::is_round(self.theta_o[lane]) | (self.link[lane] == 0);
+        (0..WIDTH).fold(true, |all, lane| all & of(lane))
+    }
+
+    #[inline(always)]
+    fn decode<const ENDLESS: bool, const ROUND: bool>(&self) -> Lanes {
         let half_extent = |axis: usize| {
             each(|lane| {
                 f32::from(self.half_extent[axis][lane]) * node::scale(self.half_exponent[lane])
@@ -136,7 +143,11 @@ impl Group {
             center: self.center,
             half_extent: [half_extent(0), half_extent(1), half_extent(2)],
             axis: [x, y, z],
-            sin_half_theta_o: each(|lane| node::decode_sin_half_theta_o(self.theta_o[lane])),
+            sin_half_theta_o: if ROUND {
+                [1.0; WIDTH]
+            } else {
+                each(|lane| node::decode_sin_half_theta_o(self.theta_o[lane]))
+            },
             cos_theta_e: each(|lane| node::decode_cos_theta_e(self.theta_e[lane])),
             two_sided: each(|lane| u32::from(node::is_two_sided(self.theta_o[lane]))),
             inverse_range2: if ENDLESS {
@@ -173,22 +184,27 @@ impl Group {
 
     #[inline(always)]
     pub(super) fn weigh_lanes(&self, viewer: &impl Viewer) -> ([f64; WIDTH], [f32; WIDTH]) {
-        // Written once and compiled twice: few scenes have a light with a range.
-        match !built_in::RANGE || self.range == [0; WIDTH] {
-            true => self.weigh_as::<true>(viewer),
-            false => self.weigh_as::<false>(viewer),
+        // Written once and compiled thrice: few scenes have a light with a range, and half of the formula is about
+        // where clusters send their light, which those of points and spheres send everywhere.
+        match (!built_in::RANGE || self.range == [0; WIDTH], self.is_round()) {
+            (true, true) => self.weigh_as::<true, true>(viewer),
+            (true, false) => self.weigh_as::<true, false>(viewer),
+            (false, _) => self.weigh_as::<false, false>(viewer),
         }
     }
 
-    /// `ENDLESS` if no lane has a range.
+    /// `ENDLESS` if no lane has a range, `ROUND` if all [are](Self::is_round).
     #[inline(always)]
-    fn weigh_as<const ENDLESS: bool>(&self, viewer: &impl Viewer) -> ([f64; WIDTH], [f32; WIDTH]) {
+    fn weigh_as<const ENDLESS: bool, const ROUND: bool>(
+        &self,
+        viewer: &impl Viewer,
+    ) -> ([f64; WIDTH], [f32; WIDTH]) {
         // Each quantity has an array over the lanes, so that the compiler computes all lanes together.
         let (mut products, mut decays, mut spreads) = ([0.0; WIDTH], [0.0; WIDTH], [0.0; WIDTH]);
         let mut sights = Sights::default();
-        let lanes = self.decode::<ENDLESS>();
+        let lanes = self.decode::<ENDLESS, ROUND>();
         for lane in 0..WIDTH {
-            let factors = viewer.factors(&lanes.cluster::<ENDLESS>(lane));
+            let factors = viewer.factors(&lanes.cluster::<ENDLESS, ROUND>(lane));
             (products[lane], decays[lane]) = (factors.product, factors.decay);
             spreads[lane] = factors.spread;
             sights.set(lane, &factors.sight);
@@ -208,13 +224,14 @@ impl Group {
 
 impl Lanes {
     #[inline(always)]
-    fn cluster<const ENDLESS: bool>(&self, lane: usize) -> Cluster {
+    fn cluster<const ENDLESS: bool, const ROUND: bool>(&self, lane: usize) -> Cluster {
         let of = |field: &[[f32; WIDTH]; 3]| [field[0][lane], field[1][lane], field[2][lane]];
         Cluster {
             center: of(&self.center),
             half_extent: of(&self.half_extent),
             axis: of(&self.axis),
-            sin_half_theta_o: self.sin_half_theta_o[lane],
+            // A constant tells the compiler what can be left out.
+            sin_half_theta_o: if ROUND { 1.0 } else { self.sin_half_theta_o[lane] },
             cos_theta_e: self.cos_theta_e[lane],
             two_sided: self.two_sided[lane] != 0,
             inverse_range2: if ENDLESS { 0.0 } else { self.inverse_range2[lane] },

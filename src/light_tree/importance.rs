@@ -101,7 +101,7 @@ impl Cluster {
         // The sine of theta_o + theta_u is negative where the sum is beyond pi.
         let sin_sum = sin_o * cos_u + cos_o * sin_u;
         let cos_sum = cos_o * cos_u - sin_o * sin_u;
-        let within = inside | (sin_sum < 0.0) | (cosine >= cos_sum);
+        let within = inside | (sin_half >= 1.0) | (sin_sum < 0.0) | (cosine >= cos_sum);
         let off = cosine * cos_sum + sine * sin_sum;
         // A lower bound of the cosine of theta_e plus the slack.
         let cos_e = self.cos_theta_e;

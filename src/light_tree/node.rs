@@ -300,6 +300,12 @@ pub(super) fn decode_sin_half_theta_o(code: u16) -> f32 {
     f32::from(code & !TWO_SIDED_BIT) * (1.0 / THETA_O_STEPS as f32)
 }
 
+/// Whether normals point in every direction: then the decoded sine is 1.
+#[inline(always)]
+pub(super) fn is_round(code: u16) -> bool {
+    code & !TWO_SIDED_BIT == THETA_O_STEPS as u16
+}
+
 #[inline(always)]
 pub(super) fn decode_cos_theta_e(code: u8) -> f32 {
     let root = f32::from(code) * (1.0 / THETA_E_STEPS as f32);
@@ -370,7 +376,7 @@ mod tests {
         let scale = (-20i32..20).prop_map(|e| 2f32.powi(e));
         let extent = prop::array::uniform3(prop_oneof![Just(0f32), 0f32..1.0]).prop_map(Vec3::from);
         let axis = point.clone().prop_filter_map("no direction", Vec3::try_normalize);
-        let theta_o = prop_oneof![Just(0f32), 0f32..PI];
+        let theta_o = prop_oneof![Just(0f32), 0f32..PI, Just(PI)];
         let theta_e = prop_oneof![Just(FRAC_PI_2), 0.001f32..FRAC_PI_2];
         let cone = (axis, theta_o, theta_e, any::<bool>()).prop_map(
             |(axis, theta_o, theta_e, two_sided)| Cone { axis, theta_o, theta_e, two_sided },
@@ -383,6 +389,17 @@ mod tests {
                 LightBounds { aabb, cone, energy, range_m }
             },
         )
+    }
+
+    #[test]
+    fn of_every_direction_the_sine_is_one() {
+        for code in 0..=u16::MAX {
+            assert_eq!(is_round(code), decode_sin_half_theta_o(code) >= 1.0, "{code}");
+        }
+        let everywhere = Aabb::around([Vec3::ONE]);
+        let everywhere =
+            LightBounds { aabb: everywhere, cone: Cone::ALL, energy: 1.0, range_m: 1.0 };
+        assert!(is_round(Node::encode(&everywhere, Link::Emitter(0)).theta_o));
     }
 
     proptest! {

@@ -1,7 +1,8 @@
 //! A set of triangles that a ray can search: the lower level of the kernel.
 
+use super::lanes::prefetch;
 use super::triangles::{Block, Ray, ShearedRay, plane_distance};
-use super::wide_bvh::{BoxRay, LEAF_SIZE, NONE, WideBvh};
+use super::wide_bvh::{AtLeaf, BoxRay, LEAF_SIZE, NONE, WideBvh};
 use crate::bounds::Aabb;
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
@@ -22,9 +23,16 @@ pub struct TriangleId {
 #[derive(Debug, Default)]
 pub struct Blas {
     tree: WideBvh,
-    blocks: Vec<Block>,
-    ids: Vec<[TriangleId; LEAF_SIZE]>,
+    leaves: Vec<Leaf>,
     bounds: Option<Aabb>,
+}
+
+/// Three cache lines.
+#[derive(Debug)]
+#[repr(C, align(64))]
+struct Leaf {
+    block: Block,
+    ids: [TriangleId; LEAF_SIZE],
 }
 
 /// Where a ray meets a triangle of a [`Blas`], in its space.
@@ -57,17 +65,17 @@ impl Blas {
             kept.par_iter().map(|&i| Aabb::around(triangles[i as usize])).collect();
         let (tree, leaves) = WideBvh::build(&boxes, LEAF_SIZE as u32);
         let filled = leaves.par_iter().map(|leaf| {
-            let (mut block, mut names) = (Block::EMPTY, [TriangleId::default(); LEAF_SIZE]);
+            let (mut block, mut of_lanes) = (Block::EMPTY, [TriangleId::default(); LEAF_SIZE]);
             for (lane, &entry) in leaf.iter().enumerate().filter(|&(_, &entry)| entry != NONE) {
                 let triangle = kept[entry as usize] as usize;
                 block.set(lane, triangles[triangle]);
-                names[lane] = ids[triangle];
+                of_lanes[lane] = ids[triangle];
             }
-            (block, names)
+            Leaf { block, ids: of_lanes }
         });
-        let (blocks, ids) = filled.unzip();
+        let leaves = filled.collect();
         let bounds = boxes.iter().copied().reduce(|a, b| a.union(&b));
-        Blas { tree, blocks, ids, bounds }
+        Blas { tree, leaves, bounds }
     }
 
     /// Around all triangles; `None` if there are none.
@@ -84,45 +92,49 @@ impl Blas {
         tmax: f64,
         met: impl FnMut(&BlasHit) -> f64,
     ) {
-        let d = ray.direction.abs();
-        if d.x >= d.y && d.x >= d.z {
-            self.visit_along::<ORDERED, 0>(ray, tmax, met)
-        } else if d.y >= d.z {
-            self.visit_along::<ORDERED, 1>(ray, tmax, met)
-        } else {
-            self.visit_along::<ORDERED, 2>(ray, tmax, met)
+        let (origin, direction) = (ray.origin.as_vec3(), ray.direction.as_vec3());
+        let (sheared, bound) = (ShearedRay::new(origin, direction), search_limit(tmax));
+        let search = Search { set: self, ray, sheared, tmax, bound, met };
+        self.tree.walk::<ORDERED>(&BoxRay::new(origin, direction), bound, search);
+    }
+}
+
+/// A ray among the triangles of a set.
+struct Search<'a, F> {
+    set: &'a Blas,
+    ray: &'a Ray,
+    sheared: ShearedRay,
+    tmax: f64,
+    /// What lies before `tmax` is searched with this.
+    bound: f32,
+    met: F,
+}
+
+impl<F: FnMut(&BlasHit) -> f64> AtLeaf for Search<'_, F> {
+    #[inline(always)]
+    fn visit(&mut self, leaf: u32) -> f32 {
+        let Leaf { block, ids } = &self.set.leaves[leaf as usize];
+        let mut lanes = block.candidates(&self.sheared, self.bound);
+        while lanes != 0 {
+            let lane = lanes.trailing_zeros() as usize % LEAF_SIZE;
+            lanes &= lanes - 1;
+            let corners = block.get(lane);
+            let Some(t) = plane_distance(self.ray, corners) else { continue };
+            if !(t > 0.0 && t < self.tmax) {
+                continue;
+            }
+            self.tmax = (self.met)(&BlasHit { t, id: ids[lane], corners });
+            if self.tmax < 0.0 {
+                return -1.0;
+            }
+            self.bound = search_limit(self.tmax);
         }
+        self.bound
     }
 
-    fn visit_along<const ORDERED: bool, const KZ: usize>(
-        &self,
-        ray: &Ray,
-        mut tmax: f64,
-        mut met: impl FnMut(&BlasHit) -> f64,
-    ) {
-        let (origin, direction) = (ray.origin.as_vec3(), ray.direction.as_vec3());
-        let box_ray = BoxRay::new(origin, direction);
-        let sheared = ShearedRay::<KZ>::new(origin, direction);
-        let mut bound = search_limit(tmax);
-        self.tree.walk::<ORDERED>(&box_ray, bound, |leaf| {
-            let block = &self.blocks[leaf as usize];
-            let mut lanes = block.candidates(&sheared, bound);
-            while lanes != 0 {
-                let lane = lanes.trailing_zeros() as usize % LEAF_SIZE;
-                lanes &= lanes - 1;
-                let corners = block.get(lane);
-                let Some(t) = plane_distance(ray, corners) else { continue };
-                if !(t > 0.0 && t < tmax) {
-                    continue;
-                }
-                tmax = met(&BlasHit { t, id: self.ids[leaf as usize][lane], corners });
-                if tmax < 0.0 {
-                    return -1.0;
-                }
-                bound = search_limit(tmax);
-            }
-            bound
-        });
+    #[inline(always)]
+    fn prefetch(&self, leaf: u32) {
+        prefetch(&self.set.leaves, leaf);
     }
 }
 

@@ -27,6 +27,7 @@
 mod anchor;
 mod binary_bvh;
 mod blas;
+mod lanes;
 mod meeting;
 mod placing;
 mod prim;

@@ -17,28 +17,37 @@ pub struct Ray {
     pub direction: DVec3,
 }
 
-/// What Woop's test needs of a ray whose largest direction component is `KZ`.
+/// What Woop's test needs of a ray.
 #[derive(Clone, Copy, Debug)]
-pub struct ShearedRay<const KZ: usize> {
+pub struct ShearedRay {
+    /// The axis along which the direction is longest comes last.
+    axes: [usize; 3],
+    /// By these axes.
     origin: [Vec4; 3],
     shear_x: Vec4,
     shear_y: Vec4,
     scale_z: Vec4,
 }
 
-impl<const KZ: usize> ShearedRay<KZ> {
-    const KX: usize = (KZ + 1) % 3;
-    const KY: usize = (KZ + 2) % 3;
-
-    /// `direction[KZ]` must not be 0.
+impl ShearedRay {
+    /// `direction` must not be 0.
     #[inline]
     pub fn new(origin: Vec3, direction: Vec3) -> Self {
-        let d = direction.to_array();
-        let scale = 1.0 / d[KZ];
+        let [x, y, z] = direction.abs().to_array();
+        let axes = if x >= y && x >= z {
+            [1, 2, 0]
+        } else if y >= z {
+            [2, 0, 1]
+        } else {
+            [0, 1, 2]
+        };
+        let [dx, dy, dz] = axes.map(|axis| direction[axis]);
+        let scale = 1.0 / dz;
         ShearedRay {
-            origin: origin.to_array().map(Vec4::splat),
-            shear_x: Vec4::splat(d[Self::KX] * scale),
-            shear_y: Vec4::splat(d[Self::KY] * scale),
+            axes,
+            origin: axes.map(|axis| Vec4::splat(origin[axis])),
+            shear_x: Vec4::splat(dx * scale),
+            shear_y: Vec4::splat(dy * scale),
             scale_z: Vec4::splat(scale),
         }
     }
@@ -70,16 +79,16 @@ impl Block {
 
     /// A bit for each lane whose triangle the line goes through, some of it between 0 and `tmax`.
     #[inline(always)]
-    pub fn candidates<const KZ: usize>(&self, ray: &ShearedRay<KZ>, tmax: f32) -> u32 {
-        let [a, b, c] = [0, 1, 2].map(|corner| {
+    pub fn candidates(&self, ray: &ShearedRay, tmax: f32) -> u32 {
+        let [kx, ky, kz] = ray.axes;
+        let sheared = |corner: usize| {
             let corner: &[Vec4; 3] = &self.corners[corner];
-            let z = corner[KZ] - ray.origin[KZ];
-            let kx = ShearedRay::<KZ>::KX;
-            let ky = ShearedRay::<KZ>::KY;
-            let x = (corner[kx] - ray.origin[kx]) - ray.shear_x * z;
-            let y = (corner[ky] - ray.origin[ky]) - ray.shear_y * z;
+            let z = corner[kz % 3] - ray.origin[2];
+            let x = (corner[kx % 3] - ray.origin[0]) - ray.shear_x * z;
+            let y = (corner[ky % 3] - ray.origin[1]) - ray.shear_y * z;
             (x, y, z * ray.scale_z)
-        });
+        };
+        let (a, b, c) = (sheared(0), sheared(1), sheared(2));
         let u = c.0 * b.1 - c.1 * b.0;
         let v = a.0 * c.1 - a.1 * c.0;
         let w = b.0 * a.1 - b.1 * a.0;

@@ -6,13 +6,12 @@
 //! the exact ray enters, at any scale.
 
 use super::binary_bvh::{self, BinaryNode};
+use super::lanes::{LANES, Lanes, WithLanes, prefetch, with_widest};
 use crate::bounds::Aabb;
-use glam::{Vec3, Vec4};
+use glam::Vec3;
 
 /// Most primitives of a leaf.
 pub const LEAF_SIZE: usize = 4;
-/// Most children of a node: two vectors of four. Eight are 10 % faster than four.
-const FAN: usize = 8;
 /// Marks a child that is a leaf; the other bits are the leaf's number.
 const LEAF: u32 = 1 << 31;
 /// No child, no primitive.
@@ -32,19 +31,21 @@ pub struct WideBvh {
     stack: usize,
 }
 
+/// Four cache lines.
 #[derive(Clone, Copy, Debug)]
+#[repr(C, align(64))]
 struct Node {
     /// Lower and upper planes of the children, by axis.
-    planes: [[[Vec4; 2]; 2]; 3],
+    planes: [[[f32; LANES]; 2]; 3],
     /// Node number, or leaf number with [`LEAF`].
-    children: [u32; FAN],
+    children: [u32; LANES],
 }
 
 /// What the box test needs of a ray.
 #[derive(Clone, Copy, Debug)]
 pub struct BoxRay {
-    origin: [Vec4; 3],
-    inverse: [Vec4; 3],
+    origin: [f32; 3],
+    inverse: [f32; 3],
     /// Which of an axis' two planes is met first.
     near: [usize; 3],
 }
@@ -55,11 +56,25 @@ impl BoxRay {
     pub fn new(origin: Vec3, direction: Vec3) -> BoxRay {
         // Bounded, so that no product with a finite distance is NaN.
         let inverse = direction.to_array().map(|d| (1.0 / d).clamp(-1e30, 1e30));
-        BoxRay {
-            origin: origin.to_array().map(Vec4::splat),
-            inverse: inverse.map(Vec4::splat),
-            near: inverse.map(|i| usize::from(i < 0.0)),
-        }
+        let near = inverse.map(|i| usize::from(i < 0.0));
+        BoxRay { origin: origin.to_array(), inverse, near }
+    }
+}
+
+/// What is done at the leaves of a walk.
+pub trait AtLeaf {
+    /// Takes a leaf's number and returns the new `tmax`; a negative one ends the walk.
+    fn visit(&mut self, leaf: u32) -> f32;
+
+    /// Begins to fetch what [`visit`](Self::visit) will look at.
+    #[inline(always)]
+    fn prefetch(&self, _leaf: u32) {}
+}
+
+impl<F: FnMut(u32) -> f32> AtLeaf for F {
+    #[inline(always)]
+    fn visit(&mut self, leaf: u32) -> f32 {
+        self(leaf)
     }
 }
 
@@ -74,72 +89,88 @@ impl WideBvh {
     }
 
     /// Visits the leaves whose boxes the ray enters before `tmax`, near ones first if `ORDERED`.
-    /// `visit` takes a leaf's number and returns the new `tmax`; a negative one ends the walk.
     #[inline(always)]
-    pub fn walk<const ORDERED: bool>(
-        &self,
-        ray: &BoxRay,
-        tmax: f32,
-        visit: impl FnMut(u32) -> f32,
-    ) {
-        if self.nodes.is_empty() {
-            return;
+    pub fn walk<const ORDERED: bool>(&self, ray: &BoxRay, tmax: f32, at_leaf: impl AtLeaf) {
+        if !self.nodes.is_empty() {
+            with_widest(Walk::<_, ORDERED> { tree: self, ray, tmax, at_leaf });
         }
+    }
+}
+
+/// A walk that is to be made.
+struct Walk<'a, A, const ORDERED: bool> {
+    tree: &'a WideBvh,
+    ray: &'a BoxRay,
+    tmax: f32,
+    at_leaf: A,
+}
+
+impl<A: AtLeaf, const ORDERED: bool> WithLanes for Walk<'_, A, ORDERED> {
+    #[inline(always)]
+    fn run<L: Lanes>(self) {
         let (mut shallow, mut deep, mut deeper);
-        let stack: &mut [(u32, f32)] = if self.stack <= SHALLOW {
+        let stack: &mut [(u32, f32)] = if self.tree.stack <= SHALLOW {
             shallow = [(0, 0.0); SHALLOW];
             &mut shallow
-        } else if self.stack <= DEEP {
+        } else if self.tree.stack <= DEEP {
             deep = [(0, 0.0); DEEP];
             &mut deep
         } else {
-            deeper = vec![(0, 0.0); self.stack];
+            deeper = vec![(0, 0.0); self.tree.stack];
             &mut deeper
         };
-        self.walk_on::<ORDERED>(ray, tmax, stack, visit);
+        self.run_on::<L>(stack);
+    }
+}
+
+impl<A: AtLeaf, const ORDERED: bool> Walk<'_, A, ORDERED> {
+    #[inline(always)]
+    fn prefetch(&self, child: u32) {
+        match child & LEAF {
+            0 => prefetch(&self.tree.nodes, child),
+            _ => self.at_leaf.prefetch(child & !LEAF),
+        }
     }
 
     #[inline(always)]
-    fn walk_on<const ORDERED: bool>(
-        &self,
-        ray: &BoxRay,
-        mut tmax: f32,
-        stack: &mut [(u32, f32)],
-        mut visit: impl FnMut(u32) -> f32,
-    ) {
-        let mut depth = 0;
-        let mut current = 0;
+    fn run_on<L: Lanes>(mut self, stack: &mut [(u32, f32)]) {
+        let ray = LaneRay::<L>::new(self.ray);
+        let (mut depth, mut current) = (0, 0);
         loop {
             if current & LEAF != 0 {
-                tmax = visit(current & !LEAF);
-                if tmax < 0.0 {
+                self.tmax = self.at_leaf.visit(current & !LEAF);
+                if self.tmax < 0.0 {
                     return;
                 }
             } else {
-                let node = &self.nodes[current as usize];
-                let (distances, mut hits) = node.enter(ray, tmax);
+                let node = &self.tree.nodes[current as usize];
+                let (distances, mut hits) = node.enter(&ray, self.tmax);
                 if hits != 0 {
-                    let first = hits.trailing_zeros() as usize;
-                    hits &= hits - 1;
+                    let child = take_lowest(&mut hits);
+                    current = node.children[child];
                     if hits == 0 {
-                        current = node.children[first % FAN];
                         continue;
                     }
-                    let base = depth;
-                    stack[depth] = (node.children[first % FAN], distances[first % FAN]);
-                    depth += 1;
+                    // The nearest is gone on with; the others wait, the farthest below.
+                    let (mut nearest, base) = (distances[child], depth);
                     while hits != 0 {
-                        let child = hits.trailing_zeros() as usize % FAN;
-                        hits &= hits - 1;
-                        let entry = (node.children[child], distances[child]);
+                        let child = take_lowest(&mut hits);
+                        let mut waiting = (node.children[child], distances[child]);
+                        if ORDERED && waiting.1 < nearest {
+                            let nearer = waiting;
+                            waiting = (current, nearest);
+                            (current, nearest) = nearer;
+                        }
                         let mut at = depth;
-                        while ORDERED && at > base && stack[at - 1].1 < entry.1 {
+                        while ORDERED && at > base && stack[at - 1].1 < waiting.1 {
                             stack[at] = stack[at - 1];
                             at -= 1;
                         }
-                        stack[at] = entry;
+                        stack[at] = waiting;
                         depth += 1;
+                        self.prefetch(waiting.0);
                     }
+                    continue;
                 }
             }
             loop {
@@ -148,7 +179,7 @@ impl WideBvh {
                 }
                 depth -= 1;
                 let (next, distance) = stack[depth];
-                if distance <= tmax {
+                if distance <= self.tmax {
                     current = next;
                     break;
                 }
@@ -157,28 +188,51 @@ impl WideBvh {
     }
 }
 
+/// Takes the lowest bit out; its number.
+#[inline(always)]
+fn take_lowest(bits: &mut u32) -> usize {
+    let lowest = bits.trailing_zeros() as usize % LANES;
+    *bits &= *bits - 1;
+    lowest
+}
+
+/// A [`BoxRay`] in all lanes.
+struct LaneRay<L> {
+    origin: [L; 3],
+    inverse: [L; 3],
+    near: [usize; 3],
+}
+
+impl<L: Lanes> LaneRay<L> {
+    #[inline(always)]
+    fn new(ray: &BoxRay) -> LaneRay<L> {
+        let [a, b, c] = ray.origin;
+        let [i, j, k] = ray.inverse;
+        LaneRay {
+            origin: [L::splat(a), L::splat(b), L::splat(c)],
+            inverse: [L::splat(i), L::splat(j), L::splat(k)],
+            near: ray.near,
+        }
+    }
+}
+
 impl Node {
-    const EMPTY: Node = Node {
-        planes: [[[Vec4::splat(f32::MAX); 2], [Vec4::splat(f32::MIN); 2]]; 3],
-        children: [NONE; FAN],
-    };
+    const EMPTY: Node =
+        Node { planes: [[[f32::MAX; LANES], [f32::MIN; LANES]]; 3], children: [NONE; LANES] };
 
     /// Distances at which the ray enters the children, and a bit for each that it enters before
     /// `tmax`.
     #[inline(always)]
-    fn enter(&self, ray: &BoxRay, tmax: f32) -> ([f32; FAN], u32) {
+    fn enter<L: Lanes>(&self, ray: &LaneRay<L>, tmax: f32) -> ([f32; LANES], u32) {
         let [x, y, z] = ray.near;
-        let half = |h: usize| {
-            let plane = |axis: usize, side: usize| {
-                (self.planes[axis][side & 1][h] - ray.origin[axis]) * ray.inverse[axis]
-            };
-            let near = plane(0, x).max(plane(1, y)).max(plane(2, z).max(Vec4::ZERO));
-            let far = plane(0, x ^ 1).min(plane(1, y ^ 1)).min(plane(2, z ^ 1)) * FAR_SLACK;
-            (near, near.cmple(far.min(Vec4::splat(tmax))).bitmask())
+        let plane = |axis: usize, side: usize| {
+            let planes = L::load(&self.planes[axis][side & 1]);
+            planes.sub(ray.origin[axis]).mul(ray.inverse[axis])
         };
-        let ((a, ma), (b, mb)) = (half(0), half(1));
-        let (a, b) = (a.to_array(), b.to_array());
-        ([a[0], a[1], a[2], a[3], b[0], b[1], b[2], b[3]], ma | mb << 4)
+        let near = plane(0, x).max(plane(1, y)).max(plane(2, z).max(L::splat(0.0)));
+        let far = plane(0, x ^ 1).min(plane(1, y ^ 1)).min(plane(2, z ^ 1));
+        let far = far.mul(L::splat(FAR_SLACK)).min(L::splat(tmax));
+        (near.store(), near.at_most(far))
     }
 }
 
@@ -208,8 +262,8 @@ impl Collapse<'_> {
                 let BinaryNode { bounds, count, .. } = binary[child];
                 let node = &mut collapse.wide.nodes[number];
                 for axis in 0..3 {
-                    node.planes[axis][0][slot / 4][slot % 4] = bounds.min[axis];
-                    node.planes[axis][1][slot / 4][slot % 4] = bounds.max[axis];
+                    node.planes[axis][0][slot] = bounds.min[axis];
+                    node.planes[axis][1][slot] = bounds.max[axis];
                 }
                 if count <= leaf_size {
                     node.children[slot] = LEAF | collapse.leaves.len() as u32;
@@ -220,7 +274,7 @@ impl Collapse<'_> {
                 }
             }
         }
-        collapse.wide.stack = (FAN - 1) * deepest + 1;
+        collapse.wide.stack = (LANES - 1) * deepest + 1;
         (collapse.wide, collapse.leaves)
     }
 
@@ -231,7 +285,7 @@ impl Collapse<'_> {
             size.x * size.y + size.y * size.z + size.z * size.x
         };
         let mut chosen = vec![top];
-        while chosen.len() < FAN {
+        while chosen.len() < LANES {
             let is_inner = |&i: &usize| self.binary[chosen[i]].count > self.leaf_size;
             let inner = (0..chosen.len()).filter(is_inner);
             let largest = inner.max_by(|&a, &b| area(&chosen[a]).total_cmp(&area(&chosen[b])));
