@@ -1,11 +1,8 @@
 //! The last promise of a scene: everything in it has a place that can be calculated with.
 
 use super::error::Fault;
-use crate::scene::Scene;
+use crate::scene::{FARTHEST_M, Scene};
 use glam::Vec3;
-
-/// Coordinates in the world stay below this many metres, so that squares of distances are finite.
-pub(super) const FARTHEST_M: f32 = 1e18;
 
 /// Checks the world transform of every node, and the world coordinates of every mesh, at rest.
 pub(super) fn check(scene: &Scene) -> Result<(), Fault> {

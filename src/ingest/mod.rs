@@ -23,7 +23,6 @@ mod extent;
 mod gltf;
 mod ies;
 mod image;
-mod normals;
 mod notes;
 mod obj;
 mod open_exr;

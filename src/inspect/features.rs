@@ -95,7 +95,7 @@ pub(super) fn features(
     all.push(Feature::new("camera lenses", needs.lenses));
     all.push(Feature::new("orthographic cameras", needs.orthographic_cameras));
     all.push(Feature::new("camera shutters", needs.shutters).used_by(
-        needs.animated_nodes + needs.varying_lights,
+        needs.animated_nodes + needs.varying_lights + needs.deforming_meshes,
         "motion blur; --no-motion-blur switches it off",
         "nothing moves",
     ));
@@ -195,6 +195,8 @@ fn motion(needs: &Requirements, emitters: &Emitters, frames: usize) -> Vec<Featu
     let each = size_of::<FrameRow>() + size_of::<[u8; 32]>();
     vec![
         Feature::new("animated nodes", needs.animated_nodes),
+        Feature::new("deforming meshes", needs.deforming_meshes)
+            .with("shaped and sorted for rays once a frame, or for each time of a shutter"),
         Feature::new("lights that vary", needs.varying_lights),
         Feature::new("lights that move or vary", changing)
             .with("rows of frames, in the tree file, beside a tree for each that is unlike the others")

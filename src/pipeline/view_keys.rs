@@ -7,7 +7,8 @@
 use crate::light_tree::learned::ViewKeys;
 use crate::render::surface::is_pane;
 use crate::scene::{
-    AlphaMode, Camera, Channel, Instance, Keys, LightKind, Links, Membership, Mesh, Pose, Scene,
+    AlphaMode, Camera, Channel, Deformation, Instance, Keys, LightKind, Links, Membership, Mesh,
+    Node, Pose, Scene, Skin,
 };
 use blake3::Hasher;
 use bytemuck::{NoUninit, cast_slice};
@@ -52,18 +53,19 @@ fn still(pose: &Pose, node: u32) -> Key {
     finish(&hasher)
 }
 
+fn add_keys<T: NoUninit>(hasher: &mut Hasher, keys: &Keys<impl Sized>, values: &[T]) {
+    hasher.update(format!("{:?} {}", keys.interpolation, values.len()).as_bytes());
+    hasher.update(cast_slice(&keys.times_s)).update(cast_slice(values));
+}
+
 fn add_channel(hasher: &mut Hasher, channel: &Channel) {
-    fn add<T: NoUninit>(hasher: &mut Hasher, keys: &Keys<impl Sized>, values: &[T]) {
-        hasher.update(format!("{:?} {}", keys.interpolation, values.len()).as_bytes());
-        hasher.update(cast_slice(&keys.times_s)).update(cast_slice(values));
-    }
     match channel {
-        Channel::Translation(keys) => add(hasher.update(b"t"), keys, &keys.values),
+        Channel::Translation(keys) => add_keys(hasher.update(b"t"), keys, &keys.values),
         Channel::Rotation(keys) => {
             let values: Vec<[f32; 4]> = keys.values.iter().map(|turn| turn.to_array()).collect();
-            add(hasher.update(b"r"), keys, &values);
+            add_keys(hasher.update(b"r"), keys, &values);
         }
-        Channel::Scale(keys) => add(hasher.update(b"s"), keys, &keys.values),
+        Channel::Scale(keys) => add_keys(hasher.update(b"s"), keys, &keys.values),
     }
 }
 
@@ -122,6 +124,9 @@ fn shape(scene: &Scene, mesh: &Mesh) -> Key {
     hasher.update(format!("{} {}", mesh.positions.len(), mesh.triangles.len()).as_bytes());
     hasher.update_rayon(cast_slice(&mesh.positions));
     hasher.update_rayon(cast_slice(&mesh.triangles));
+    if let Some(deformation) = &mesh.deformation {
+        add_deformation(&mut hasher, deformation);
+    }
     let material = mesh.material.map(|material| &scene.materials[material as usize]);
     if let Some(material) = material.filter(|own| own.alpha_mode != AlphaMode::Opaque) {
         hasher.update(format!("{:?} {}", material.alpha_mode, material.opacity).as_bytes());
@@ -143,6 +148,26 @@ fn shape(scene: &Scene, mesh: &Mesh) -> Key {
         hasher.update(b"pane");
     }
     finish(&hasher)
+}
+
+/// All that decides how a mesh is bent.
+fn add_deformation(hasher: &mut Hasher, deformation: &Deformation) {
+    let Deformation { rest, targets, weights, skin } = deformation;
+    hasher.update_rayon(cast_slice(&rest.positions));
+    targets.iter().for_each(|target| {
+        hasher.update_rayon(cast_slice(&target.positions));
+    });
+    weights.iter().for_each(|keys| add_keys(hasher, keys, &keys.values));
+    let Some(Skin { skeleton, ends, influences }) = skin else { return };
+    hasher.update(cast_slice(ends));
+    influences.iter().for_each(|(joint, weight)| {
+        hasher.update(&joint.to_le_bytes()).update(&weight.to_le_bytes());
+    });
+    for Node { parent, local, channels, .. } in &skeleton.nodes {
+        hasher.update(format!("{parent:?} {local:?}").as_bytes());
+        channels.iter().for_each(|channel| add_channel(hasher, channel));
+    }
+    hasher.update(format!("{:?}", skeleton.joints).as_bytes());
 }
 
 fn through(camera: &Camera, places: &[Key]) -> Key {

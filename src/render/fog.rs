@@ -269,7 +269,7 @@ fn around_everything(scene: &Scene, pose: &Pose, camera: &Camera) -> (Vec3, Vec3
     let mut add = |p: Vec3| (min, max) = (min.min(p), max.max(p));
     for instance in &scene.instances {
         let (low, high) = *boxes[instance.mesh as usize].get_or_insert_with(|| {
-            let positions = &scene.meshes[instance.mesh as usize].positions;
+            let positions = pose.positions(scene, instance.mesh);
             positions.iter().fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(low, high), &p| {
                 (low.min(p), high.max(p))
             })

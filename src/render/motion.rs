@@ -1,16 +1,16 @@
 //! Motion vectors: how far what a pixel sees moves on the picture, to the next frame and from the last.
 //!
 //! In pixels, to the right and up, as Nuke's layers `forward` and `backward` have it: `forward` leads to
-//! the place in the next frame, `backward` to the place in the last one. Camera and rigid motion at the
+//! the place in the next frame, `backward` to the place in the last one. Camera, motion and deformation at the
 //! first hit count; reflections do not. Both ends are projected through the middle of the lens, so what
 //! stands still has exactly zero. What is infinitely far turns with the camera. Beyond the shot's keys
 //! nothing moves. In a frame that is blurred, the motion is that of the middle of the time.
 
 use super::camera::CameraRays;
 use super::path::PathSample;
-use super::rays::HitSurface;
-use crate::scene::{Camera, Pose, Scene};
-use glam::{Affine3A, DAffine3, DVec2, DVec3, Vec3};
+use super::rays::{Hit, HitSurface};
+use crate::scene::{Camera, Instance, Pose, Scene};
+use glam::{Affine3A, DAffine3, DVec2, DVec3, Vec2, Vec3};
 
 /// A frame and its neighbours.
 pub struct Motion<'a> {
@@ -48,17 +48,34 @@ impl<'a> Motion<'a> {
             let here = at(&self.camera);
             return self.neighbours.each_ref().map(|(_, camera)| moved(here, at(camera)));
         };
+        let here = self.camera.project(self.carried(hit, pose, self.pose));
+        self.neighbours
+            .each_ref()
+            .map(|(there, camera)| moved(here, camera.project(self.carried(hit, pose, there))))
+    }
+
+    /// Where what was hit in one pose is in another.
+    fn carried(&self, hit: &Hit, from: &Pose, to: &Pose) -> DVec3 {
         let node = match hit.surface {
-            HitSurface::Triangle { instance, .. } => self.scene.instances[instance as usize].node,
+            HitSurface::Triangle { instance, triangle, barycentric } => {
+                if self.scene.deforms(instance) {
+                    return self.on_shape(to, (instance, triangle), barycentric);
+                }
+                self.scene.instances[instance as usize].node
+            }
             HitSurface::Sphere { light } => self.scene.lights[light as usize].node,
         };
-        let point = hit.anchor.position;
-        let own = pose.world(node);
-        let here = self.camera.project(carried(point, own, self.pose.world(node)));
-        self.neighbours.each_ref().map(|(pose, camera)| {
-            let there = carried(point, own, pose.world(node));
-            moved(here, camera.project(there))
-        })
+        carried(hit.anchor.position, from.world(node), to.world(node))
+    }
+
+    /// A point of a triangle of an instance that deforms.
+    fn on_shape(&self, pose: &Pose, (instance, triangle): (u32, u32), at: Vec2) -> DVec3 {
+        let Instance { node, mesh, .. } = self.scene.instances[instance as usize];
+        let positions = pose.positions(self.scene, mesh);
+        let corners = self.scene.meshes[mesh as usize].triangles[triangle as usize];
+        let [a, b, c] = corners.map(|corner| positions[corner as usize].as_dvec3());
+        let [u, v] = at.as_dvec2().to_array();
+        double(pose.world(node)).transform_point3(a + u * (b - a) + v * (c - a))
     }
 }
 
@@ -68,13 +85,14 @@ fn carried(point: Vec3, from: Affine3A, to: Affine3A) -> DVec3 {
     if from == to {
         return point;
     }
-    let double = |world: Affine3A| {
-        let translation = Vec3::from(world.translation).as_dvec3();
-        DAffine3 { matrix3: world.matrix3.as_dmat3(), translation }
-    };
     let there = (double(to) * double(from).inverse()).transform_point3(point);
     // A node that is flat has no inverse.
     if there.is_finite() { there } else { point }
+}
+
+fn double(world: Affine3A) -> DAffine3 {
+    let translation = Vec3::from(world.translation).as_dvec3();
+    DAffine3 { matrix3: world.matrix3.as_dmat3(), translation }
 }
 
 fn moved(here: Option<DVec2>, there: Option<DVec2>) -> DVec2 {

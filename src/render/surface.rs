@@ -68,6 +68,9 @@ impl Surface {
 #[derive(Clone, Copy)]
 struct At<'a> {
     mesh: &'a Mesh,
+    positions: &'a [Vec3],
+    normals: &'a [Vec3],
+    tangents: &'a [Vec4],
     corners: [usize; 3],
     weights: [f32; 3],
 }
@@ -144,11 +147,18 @@ impl<'a> Surfaces<'a> {
     }
 
     fn locate(&self, instance: u32, triangle: u32, barycentric: Vec2) -> (At<'a>, &Material) {
-        let mesh = &self.scene.meshes[self.scene.instances[instance as usize].mesh as usize];
+        let number = self.scene.instances[instance as usize].mesh;
+        let mesh = &self.scene.meshes[number as usize];
+        let (mut positions, mut normals, mut tangents): (&[Vec3], &[Vec3], &[Vec4]) =
+            (&mesh.positions, &mesh.normals, &mesh.tangents);
+        if let Some(shape) = self.pose.shape(self.scene, number) {
+            (positions, normals, tangents) = (&shape.positions, &shape.normals, &shape.tangents);
+        }
         let corners = mesh.triangles[triangle as usize].map(|corner| corner as usize);
         let [u, v] = barycentric.to_array();
         let material = mesh.material.map_or(&self.plain, |m| &self.scene.materials[m as usize]);
-        (At { mesh, corners, weights: [1.0 - u - v, u, v] }, material)
+        let weights = [1.0 - u - v, u, v];
+        (At { mesh, positions, normals, tangents, corners, weights }, material)
     }
 
     /// White where there is no texture.
@@ -211,10 +221,10 @@ impl<'a> Surfaces<'a> {
     ) -> Vec3 {
         // Products of axes of 1e-20 m vanish in 32 bits.
         let (mirrored, matrix) = (mirrors(to_world), to_world.matrix3.as_dmat3());
-        let smooth = if at.mesh.normals.is_empty() {
+        let smooth = if at.normals.is_empty() {
             flat
         } else {
-            let local = at.interpolate(&at.mesh.normals).as_dvec3();
+            let local = at.interpolate(at.normals).as_dvec3();
             let across = cofactor(matrix) * local;
             let normal = across.try_normalize().map_or(flat, |across| across.as_vec3());
             if normal.dot(flat) < 0.0 { -normal } else { normal }
@@ -259,15 +269,15 @@ impl At<'_> {
     /// Local tangent, and the sign of the bitangent `normal x tangent`. Derived where the mesh has
     /// none: along growing u; the bitangent then goes up the picture, against growing v.
     fn tangent(&self, used: &TextureUse) -> Option<(DVec3, f32)> {
-        if !self.mesh.tangents.is_empty() {
-            let tangent = self.interpolate(&self.mesh.tangents);
+        if !self.tangents.is_empty() {
+            let tangent = self.interpolate(self.tangents);
             return Some((tangent.truncate().as_dvec3(), 1.0_f32.copysign(tangent.w)));
         }
         let uvs = self.uv_set(used);
         if uvs.is_empty() {
             return None;
         }
-        let [a, b, c] = self.corners.map(|corner| self.mesh.positions[corner].as_dvec3());
+        let [a, b, c] = self.corners.map(|corner| self.positions[corner].as_dvec3());
         let [ta, tb, tc] = self.corners.map(|corner| used.map(uvs[corner]).as_dvec2());
         let (ab, ac) = (b - a, c - a);
         let (tb, tc) = (tb - ta, tc - ta);

@@ -1,8 +1,9 @@
 //! Triangles, and where they stand.
 
-use super::{Keys, Shaping, Visibility};
+use super::{Deformation, Keys, Shaping, Visibility};
 use crate::math::color::Rgb;
 use glam::{Vec2, Vec3, Vec4};
+use std::sync::Arc;
 
 /// Triangles with one material, in local space. All attribute arrays that are not empty have as
 /// many entries as `positions`; every index is in range; every number is finite.
@@ -24,6 +25,9 @@ pub struct Mesh {
     pub triangles: Vec<[u32; 3]>,
     /// Index into [`Scene::materials`](super::Scene::materials).
     pub material: Option<u32>,
+    /// How it changes its shape over time, if it does. Positions, normals and tangents above are those of the shot's
+    /// first frame; [`Pose::shape`](super::Pose::shape) knows all others. A mesh that gives light never does.
+    pub deformation: Option<Arc<Deformation>>,
 }
 
 /// A mesh put at a node: a prim that a ray can hit.

@@ -25,6 +25,7 @@
 //! whose origin is [`Scene::origin`].
 
 mod camera;
+mod deformation;
 mod ies_profile;
 mod light;
 mod linking;
@@ -44,6 +45,7 @@ mod values;
 mod visibility;
 
 pub use camera::{Camera, Projection};
+pub use deformation::{Bend, Deformation, FARTHEST_M, Shape, Skeleton, Skin, Target, is_near};
 pub use ies_profile::{IesProfile, IesTable, LitCone, Pole};
 pub use light::{Light, LightKind, Shaping};
 pub use linking::{LinkRows, Linking, Links, Membership};
@@ -60,6 +62,7 @@ pub use texture::{Pixels, Texture, TextureUse, Wrap};
 pub use timeline::Timeline;
 pub use visibility::Visibility;
 
+use crate::math::built_in;
 use glam::DVec3;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
@@ -118,6 +121,7 @@ impl Scene {
         nodes.all(|node| one.world(node) == other.world(node))
             && lights().all(|(row, _)| one.light_rgb(row) == other.light_rgb(row))
             && one.instance_rgb == other.instance_rgb
+            && one.bends == other.bends
     }
 
     /// Whether any light but those at infinity moves, or varies in strength.
@@ -142,6 +146,12 @@ impl Scene {
     /// unevenly at any time, or down to nothing.
     pub fn rigid_nodes(&self) -> Vec<bool> {
         pose::rigid(&self.nodes)
+    }
+
+    /// Whether an instance changes its shape with time.
+    pub fn deforms(&self, instance: u32) -> bool {
+        let mesh = self.instances[instance as usize].mesh;
+        built_in::MOTION && self.meshes[mesh as usize].deformation.is_some()
     }
 
     /// The material of a mesh, if it has one of its own.

@@ -2,6 +2,7 @@
 //!
 //! A key counts as at a frame's time if it is [meant to be](Timeline::is_same).
 
+use super::deformation::{Bend, Shape, Shapes, bends};
 use super::{Scene, Timeline};
 use crate::math::built_in;
 use crate::math::color::Rgb;
@@ -70,14 +71,18 @@ pub enum Interpolation {
     Cubic,
 }
 
-/// Whatever varies, at one time: world transforms of all nodes, strengths of the lights with keys.
-#[derive(Clone, Debug, PartialEq)]
+/// Whatever varies, at one time: world transforms of all nodes, strengths of the lights with keys, shapes of the meshes
+/// that deform.
+#[derive(Clone, Debug)]
 pub struct Pose {
     pub(super) world: Vec<Affine3A>,
     /// By row of [`Scene::lights`]; empty if none has keys.
     pub(super) light_rgb: Vec<Option<Rgb>>,
     /// By row of [`Scene::instances`]; empty if none has keys.
     pub(super) instance_rgb: Vec<Option<Rgb>>,
+    /// How far meshes are bent, in the order of those that deform; empty if none does.
+    pub(super) bends: Vec<Bend>,
+    pub(super) shapes: Shapes,
 }
 
 impl Default for Trs {
@@ -101,6 +106,8 @@ impl Pose {
             world: exact.iter().map(DAffine3::as_affine3a).collect(),
             light_rgb: values_at(lights, at),
             instance_rgb: values_at(instances, at),
+            bends: bends(scene, time_s),
+            shapes: Shapes::default(),
         };
         (pose, exact)
     }
@@ -122,6 +129,18 @@ impl Pose {
     #[inline]
     pub fn instance_rgb(&self, instance: u32) -> Option<Rgb> {
         self.instance_rgb.get(instance as usize).copied().flatten().filter(|_| built_in::MOTION)
+    }
+
+    /// The shape of a mesh, if it deforms. The scene must be the one that was posed.
+    #[inline]
+    pub fn shape(&self, scene: &Scene, mesh: u32) -> Option<&Shape> {
+        self.shapes.of(scene, &self.bends, mesh).filter(|_| built_in::MOTION)
+    }
+
+    /// The positions of a mesh, which may deform, in its own space, metres.
+    pub fn positions<'a>(&'a self, scene: &'a Scene, mesh: u32) -> &'a [Vec3] {
+        let shape = self.shape(scene, mesh);
+        shape.map_or(&scene.meshes[mesh as usize].positions, |shape| &shape.positions)
     }
 
     /// Local to world for a node, from [`Scene::origin`] on.

@@ -58,6 +58,8 @@ pub struct Requirements {
     pub textures: usize,
     /// Homogeneous fog, 0 or 1.
     pub fog: usize,
+    /// Meshes that change their shape with time.
+    pub deforming_meshes: usize,
     /// Cameras with a lens.
     pub lenses: usize,
     /// Orthographic cameras.
@@ -131,6 +133,7 @@ impl Requirements {
             needs.solid_glass += usize::from(material.is_solid_glass());
         }
         needs.glossy += usize::from(scene.meshes.iter().any(|mesh| mesh.material.is_none()));
+        needs.deforming_meshes = scene.meshes.iter().filter(|m| m.deformation.is_some()).count();
         needs.fog = usize::from(scene.medium.is_some());
         needs.lenses = scene.cameras.iter().filter(|c| c.lens_radius_m > 0.0).count();
         let is_parallel = |c: &&Camera| matches!(c.projection, Projection::Orthographic { .. });

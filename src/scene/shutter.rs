@@ -11,7 +11,7 @@ use super::{Camera, Scene};
 const MOST_TIMES: usize = 128;
 /// ...and so many at least...
 const FEWEST_TIMES: usize = 8;
-/// ...for so many poses of instances, lights, and triangles of mesh lights that move, in all.
+/// ...for so many poses of instances, lights, and triangles of mesh lights that move and of meshes that deform, in all.
 const MOST_POSES: usize = 1 << 21;
 
 /// When a shutter is open, in frames from the frame that is rendered on. It is open for a while.
@@ -84,8 +84,11 @@ impl Scene {
             .iter()
             .enumerate()
             .filter(|(row, instance)| moving[instance.node as usize] && shines(*row));
+        let deforming = self.instances.iter().enumerate();
+        let deforming = deforming.filter(|(row, _)| self.deforms(*row as u32));
+        let posed_by_triangle = moving_lights.chain(deforming);
         let triangles =
-            moving_lights.map(|(_, row)| self.meshes[row.mesh as usize].triangles.len());
+            posed_by_triangle.map(|(_, row)| self.meshes[row.mesh as usize].triangles.len());
         let posed = self.instances.len() + self.lights.len() + triangles.sum::<usize>();
         let times = (MOST_POSES / posed.max(1)).clamp(FEWEST_TIMES, MOST_TIMES);
         1 << times.ilog2()

@@ -241,7 +241,7 @@ fn weights_are_those_of_the_first_frame() {
         assert_near(&scene.meshes[0].positions[..1], &[Vec3::new(x + 100.0 * far, y, z)]);
         let [note] = &scene.notes[..] else { panic!("{:?}", scene.notes) };
         assert_eq!(note.category, Category::Animation);
-        assert!(note.text.contains("node 0 \"lamp\": deforms after"), "{note}");
+        assert!(note.text.contains("/lamp: deforms after"), "{note}");
     }
 }
 
@@ -362,6 +362,6 @@ fn a_mesh_deforms_if_its_joints_move_against_each_other() {
     assert_eq!(moved(1, &stays), (vec![], Vec3::ZERO));
     let (notes, way) = moved(1, &goes);
     assert_eq!(way, Vec3::ZERO);
-    let text = "animation: node 0 \"lamp\": deforms after the first frame; it keeps the shape of the first frame";
+    let text = "animation: /lamp: deforms after the first frame; it gives light, and so keeps the shape of the first frame";
     assert_eq!(notes, [text]);
 }

@@ -4,6 +4,7 @@
 mod bounces;
 mod cameras;
 mod closed_forms;
+mod deforming;
 mod determinism;
 mod extremes;
 mod far;

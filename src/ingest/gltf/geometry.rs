@@ -5,17 +5,17 @@ use super::attributes::Attributes;
 use super::document::label;
 use super::glass;
 use super::materials::{Materials, uv_sets};
-use super::posing::{Arrays, Hung, Pose, Poses};
+use super::posing::{Arrays, Hung, Pose, Posed, Poses};
 use super::{Output, Source};
 use crate::ingest::error::Fault;
-use crate::ingest::normals;
-use crate::scene::{Category, Mesh};
+use crate::scene::{Category, Mesh, Shape};
 use glam::{Vec2, Vec3, Vec4};
 use gltf::json::mesh::{Mode, Primitive, Semantic};
 use gltf::json::validation::Checked;
 use gltf::json::{Index, Mesh as Row};
 use std::collections::HashMap;
 use std::rc::Rc;
+use std::sync::Arc;
 
 /// A texture set's number is its place in a list; honest files have two or three.
 const MOST_UV_SETS: u32 = 16;
@@ -208,15 +208,19 @@ impl Meshes {
         }
         let arrays =
             Arrays { attributes: &attributes, vertices: &vertices, positions: positions.count };
-        let hung = poses.apply(source, output, (pose, &arrays), &mut mesh, object)?;
-        normals::make_unit(&mut mesh);
-        mesh.tangents.iter_mut().for_each(|tangent| *tangent = unit_tangent(*tangent));
+        let Posed { hung, mut deformation } =
+            poses.apply(source, output, (pose, &arrays), &mut mesh, object)?;
+        let mut shape = Shape::take(&mut mesh);
+        shape.make_unit(&mesh.triangles);
+        shape.put(&mut mesh);
         // A mesh with tangents of no length has none that mean anything.
-        if mesh.tangents.iter().any(|tangent| !tangent.is_finite()) {
+        if mesh.tangents.iter().any(|tangent| tangent.truncate() == Vec3::ZERO) {
             let text = "has tangents without a direction; derived from its texture set";
             output.notes.add(Category::Geometry, object, text);
             mesh.tangents.clear();
+            deformation.iter_mut().for_each(|how| how.rest.tangents.clear());
         }
+        mesh.deformation = deformation.map(Arc::new);
         if let Some(accessor) = attribute(Semantic::Colors(0), output) {
             mesh.colors = vertices.read(accessor, 1.0, |color| {
                 let color = Vec4::from(color).clamp(Vec4::ZERO, Vec4::ONE);
@@ -299,12 +303,6 @@ impl Vertices {
             None => (0..self.count).map(vertex).collect(),
         }
     }
-}
-
-/// Not finite if it has no length.
-fn unit_tangent(tangent: Vec4) -> Vec4 {
-    let handedness = if tangent.w < 0.0 { -1.0 } else { 1.0 };
-    tangent.truncate().try_normalize().unwrap_or(Vec3::NAN).extend(handedness)
 }
 
 #[cfg(test)]

@@ -5,7 +5,7 @@ use super::document::{Real, Transform, UsdFog, UsdLux, label, usd_path};
 use super::geometry::{Compiled, Meshes};
 use super::lights::{self, Placed};
 use super::links::LinkTable;
-use super::posing::{Hung, Pose, Poses};
+use super::posing::{self, Hung, Pose, Poses};
 use super::profiles::Profiles;
 use super::{Output, Source, cameras, fog, instancing};
 use crate::ingest::error::Fault;
@@ -95,6 +95,7 @@ pub(super) fn compile(source: &Source, output: &mut Output) -> Result<(), Fault>
         stack.extend(children.map(|&child| open(child, Some(node), visible)));
     }
     walk.hang(output)?;
+    posing::settle(output);
     walk.links.finish(output)
 }
 
@@ -286,7 +287,6 @@ impl Walk<'_> {
             let membership = self.links.of_primitive(output, primitive, above, placed.object)?;
             self.links.add_instance(output, Links { membership, ..links })?;
             if let Some(hung) = hung {
-                hung.note(output, placed.object);
                 let bytes = size_of::<Hanging>() as u64;
                 output.budget.take(bytes, || placed.object.to_string())?;
                 let instance = output.scene.instances.len() as u32;

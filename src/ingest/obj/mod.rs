@@ -22,11 +22,10 @@ mod text;
 
 use super::budget::Budget;
 use super::error::Fault;
-use super::normals;
 use super::notes::Notes;
 use super::paths::{PrimPaths, component};
 use super::uri::Folder;
-use crate::scene::{Category, Instance, Material, Mesh, Node, Scene, Trs, Visibility};
+use crate::scene::{Category, Instance, Material, Mesh, Node, Scene, Shape, Trs, Visibility};
 use glam::{Vec2, Vec3};
 use library::Library;
 use materials::Materials;
@@ -162,7 +161,9 @@ fn compile(
     if has_all(|vertex| vertex.normal) {
         let normal = |v: &Corner| finite(model.normals[v.normal as usize]);
         mesh.normals = vertices.iter().map(normal).collect();
-        normals::make_unit(&mut mesh);
+        let mut shape = Shape::take(&mut mesh);
+        shape.make_unit(&mesh.triangles);
+        shape.put(&mut mesh);
     }
     let color = |v: &Corner| model.colors[v.position as usize];
     if !model.colors.is_empty() && vertices.iter().all(|v| color(v).is_finite()) {

@@ -3,7 +3,8 @@
 //! Two levels. [`RayScene`] is prepared once for a shot: one world-space set of triangles for all
 //! that stands still, one local-space set for each mesh that moves or is shared by so many
 //! instances that copies would cost memory, and a small tree over the placed meshes and the sphere lights
-//! that stand still. [`Tracer`] is one time of it: another such tree over those that move, built for a [`Pose`].
+//! that stand still. [`Tracer`] is one time of it: another such tree over those that move, built for a [`Pose`], with
+//! a world-space set for each mesh that deforms.
 //!
 //! What callers may rely on:
 //!
@@ -93,6 +94,8 @@ impl RayScene {
                 });
                 let rows = if moves[instance.node as usize] { &mut moving } else { &mut standing };
                 rows.instances.push((number, set));
+            } else if scene.deforms(number) {
+                moving.deforming.push(number);
             } else {
                 flat.push(number);
             }
@@ -104,7 +107,8 @@ impl RayScene {
             }
         }
         let local = |&mesh: &u32| {
-            let (triangles, ids) = in_space(&scene.meshes[mesh as usize], 0, DAffine3::IDENTITY);
+            let mesh = &scene.meshes[mesh as usize];
+            let (triangles, ids) = in_space(mesh, &mesh.positions, 0, DAffine3::IDENTITY);
             Blas::build(&triangles, &ids)
         };
         let parts: Vec<_> = flat.par_iter().map(|&i| in_world(scene, pose, i)).collect();
@@ -148,12 +152,14 @@ pub fn kept_in_own_space(scene: &Scene) -> Vec<bool> {
     for instance in &scene.instances {
         uses[instance.mesh as usize] += 1;
     }
-    let is_kept = |instance: &Instance| {
+    let is_kept = |(row, instance): (u32, &Instance)| {
         let size = scene.meshes[instance.mesh as usize].triangles.len();
         let copied = (uses[instance.mesh as usize] - 1) * size;
-        moving[instance.node as usize] || (size > TINY_MESH && copied > COPIED_TRIANGLES)
+        // What deforms has no shape of its own that could be searched at all times.
+        !scene.deforms(row)
+            && (moving[instance.node as usize] || (size > TINY_MESH && copied > COPIED_TRIANGLES))
     };
-    scene.instances.iter().map(is_kept).collect()
+    (0..).zip(&scene.instances).map(is_kept).collect()
 }
 
 /// Whether an instance shines at any time.
@@ -172,10 +178,15 @@ fn ranks(instances: &[Instance]) -> Vec<u32> {
     ranks
 }
 
-/// The triangles of a mesh, transformed in double precision and rounded once.
-fn in_space(mesh: &Mesh, instance: u32, transform: DAffine3) -> (Vec<[Vec3; 3]>, Vec<TriangleId>) {
+/// The triangles of a mesh with some positions, transformed in double precision and rounded once.
+fn in_space(
+    mesh: &Mesh,
+    positions: &[Vec3],
+    instance: u32,
+    transform: DAffine3,
+) -> (Vec<[Vec3; 3]>, Vec<TriangleId>) {
     let transformed = |&p: &Vec3| transform.transform_point3(p.as_dvec3()).as_vec3();
-    let points: Vec<Vec3> = mesh.positions.iter().map(transformed).collect();
+    let points: Vec<Vec3> = positions.iter().map(transformed).collect();
     let corners = |triangle: &[u32; 3]| triangle.map(|corner| points[corner as usize]);
     let triangles = mesh.triangles.iter().map(corners).collect();
     let ids = (0..mesh.triangles.len() as u32).map(|triangle| TriangleId { instance, triangle });
@@ -185,7 +196,8 @@ fn in_space(mesh: &Mesh, instance: u32, transform: DAffine3) -> (Vec<[Vec3; 3]>,
 /// The triangles of an instance in world space.
 fn in_world(scene: &Scene, pose: &Pose, instance: u32) -> (Vec<[Vec3; 3]>, Vec<TriangleId>) {
     let placed = &scene.instances[instance as usize];
-    in_space(&scene.meshes[placed.mesh as usize], instance, world_of(pose, placed.node))
+    let mesh = &scene.meshes[placed.mesh as usize];
+    in_space(mesh, pose.positions(scene, placed.mesh), instance, world_of(pose, placed.node))
 }
 
 /// Local to world of a node.

@@ -11,12 +11,15 @@ use super::{in_world, may_shine, world_of};
 use crate::bounds::Aabb;
 use crate::scene::{LightKind, Pose, Scene};
 use glam::{DAffine3, DVec3, Vec3};
+use rayon::prelude::*;
 
 /// What is to be placed.
 #[derive(Debug, Default)]
 pub(super) struct Rows {
     /// Instances, and the set of triangles that each refers to.
     pub instances: Vec<(u32, u32)>,
+    /// Instances that change their shape.
+    pub deforming: Vec<u32>,
     /// Rows of [`Scene::lights`]: spheres.
     pub spheres: Vec<u32>,
 }
@@ -40,8 +43,9 @@ pub(super) enum Item {
         set: u32,
         space: Space,
     },
-    /// A mesh that its transform makes flat: it has no local space to search in.
-    Flattened {
+    /// A mesh in world space: one that deforms, or one that its transform makes flat, which has no local space to
+    /// search in.
+    InWorld {
         set: Box<Blas>,
     },
 }
@@ -51,7 +55,14 @@ impl Placing {
     pub fn new(scene: &Scene, pose: &Pose, sets: &[Blas], rows: &Rows) -> Placing {
         let (mut boxes, mut unordered) = (Vec::new(), Vec::new());
         let mut shining = Vec::new();
-        for &(instance, set) in &rows.instances {
+        let in_world = |instance: u32| {
+            let (triangles, ids) = in_world(scene, pose, instance);
+            let set = Box::new(Blas::build(&triangles, &ids));
+            let bounds = set.bounds();
+            (Item::InWorld { set }, bounds)
+        };
+        let own: Vec<_> = rows.deforming.par_iter().map(|&row| (row, in_world(row))).collect();
+        let placed = rows.instances.iter().map(|&(instance, set)| {
             let to_world = world_of(pose, scene.instances[instance as usize].node);
             let to_local = to_world.inverse();
             let (item, bounds) = if to_local.is_finite() {
@@ -59,11 +70,11 @@ impl Placing {
                 let bounds = bounds.map(|bounds| transform_box(&bounds, &to_world));
                 (Item::Mesh { instance, set, space: Space { to_world, to_local } }, bounds)
             } else {
-                let (triangles, ids) = in_world(scene, pose, instance);
-                let set = Box::new(Blas::build(&triangles, &ids));
-                let bounds = set.bounds();
-                (Item::Flattened { set }, bounds)
+                in_world(instance)
             };
+            (instance, (item, bounds))
+        });
+        for (instance, (item, bounds)) in placed.chain(own) {
             if let Some(bounds) = bounds.filter(is_sound) {
                 shining.extend(may_shine(scene, instance).then_some(bounds));
                 boxes.push(bounds);

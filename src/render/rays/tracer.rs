@@ -235,7 +235,7 @@ impl<'a> Tracer<'a> {
                             tmax
                         });
                     }
-                    Item::Flattened { set } => set.visit::<ORDERED>(ray, tmax, |hit| {
+                    Item::InWorld { set } => set.visit::<ORDERED>(ray, tmax, |hit| {
                         tmax = met(&Meeting::with_triangle(hit, None));
                         tmax
                     }),

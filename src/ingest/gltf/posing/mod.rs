@@ -1,4 +1,4 @@
-//! Morph targets and skins: meshes in the shape of the shot's first frame.
+//! Morph targets and skins: meshes in the shape of the shot's first frame, and what changes that later.
 //!
 //! Source: glTF 2.0, 3.7.2.2 (morph targets) and 3.7.3.3 (skins); UsdSkel's exporter, `scripts/usd_gltf/skinning.py`,
 //! keeps to the same rules.
@@ -8,10 +8,11 @@
 //! - Weights of morph targets are those of the node's animation at the first frame, else the node's, else the mesh's.
 //! - The transform of a skinned mesh's node has no meaning. The mesh is *hung* at a node that its joints have in
 //!   common, and its vertices are in that node's space; so it is carried as a whole by whatever moves there. Where the
-//!   joints never move against each other, that is the deepest common one. Else the mesh deforms, and hangs above its
-//!   skeleton, which holds still as it was at the first frame; a note says so.
-//! - Normals follow by the cofactors of the matrix, which are its inverse transpose but for a factor, and exist where
-//!   a joint has scale 0. Where joints mirror, triangles are turned over, so that their fronts stay fronts.
+//!   joints never move against each other, that is the deepest common one. Else the mesh
+//!   [deforms](crate::scene::Deformation), and hangs above its skeleton.
+//! - A mesh that gives light keeps the shape of the first frame, for light trees hold lights that stay as they are; a
+//!   note says so.
+//! - Where joints mirror at the first frame, triangles are turned over, so that their fronts stay fronts.
 //! - What cannot be read is left out, with a note: a skin, or all morph targets of a primitive.
 //!
 //! | file | what |
@@ -35,16 +36,17 @@ use super::document::{label, morph_targets};
 use super::geometry::Vertices;
 use super::{Output, Source};
 use crate::ingest::error::Fault;
-use crate::ingest::extent::FARTHEST_M;
-use crate::scene::{Category, Channel, Mesh};
+use crate::scene::{Category, Channel, Deformation, Mesh, Shape};
+use glam::{Vec3, Vec4};
 use gltf::json::mesh::{Primitive, Semantic};
 use gltf::json::validation::Checked;
 use gltf::json::{Index, Mesh as Row, Node};
 use rig::Rig;
 use std::collections::BTreeMap;
 
-/// The text of the note on a mesh that changes its shape.
-const DEFORMS: &str = "deforms after the first frame; it keeps the shape of the first frame";
+/// The text of the note on a mesh light that would change its shape.
+const KEEPS_SHAPE: &str =
+    "deforms after the first frame; it gives light, and so keeps the shape of the first frame";
 
 /// What poses the meshes of a file.
 pub(super) struct Poses {
@@ -58,8 +60,10 @@ pub(super) struct Poses {
 pub(super) struct Pose {
     /// The number of the skin.
     skin: Option<usize>,
-    /// The bits of the weights of its morph targets; none if all are zero.
+    /// The bits of the weights of its morph targets at the first frame; none if all are zero, now and later.
     weights: Vec<u32>,
+    /// The node whose animation changes them later.
+    animated: Option<usize>,
 }
 
 /// Where a skinned mesh hangs.
@@ -68,7 +72,16 @@ pub(super) struct Hung {
     /// The node of the file in whose space its vertices are; `None` is the world.
     pub below: Option<usize>,
     /// Whether its joints move against each other, or against that node, in the shot.
-    pub deforms: bool,
+    deforms: bool,
+}
+
+/// A mesh that is posed.
+#[derive(Default)]
+pub(super) struct Posed {
+    /// Where it hangs, if joints move it.
+    pub hung: Option<Hung>,
+    /// How it changes its shape later.
+    pub deformation: Option<Deformation>,
 }
 
 /// The arrays of a primitive that is posed.
@@ -104,22 +117,22 @@ impl Poses {
         }
         if mesh.primitives.iter().any(|primitive| morph_targets(primitive) > 0) {
             let animated = self.weights.get(&number);
+            let varies = animated.is_some_and(|weights| !weights.keys.is_empty());
+            pose.animated = varies.then_some(number);
             let first = animated.map(|weights| &weights.first);
             let weights = first.or(node.weights.as_ref()).or(mesh.weights.as_ref());
-            let weights = weights.filter(|weights| weights.iter().any(|&weight| weight != 0.0));
+            let is_needed =
+                |weights: &&Vec<f32>| varies || weights.iter().any(|&weight| weight != 0.0);
+            let weights = weights.filter(is_needed);
             let object = || label("node", number, node.name.as_deref());
             let bytes = 4 * weights.map_or(0, Vec::len);
             output.budget.take(bytes as u64, object)?;
             pose.weights = weights.into_iter().flatten().map(|weight| weight.to_bits()).collect();
-            if animated.is_some_and(|weights| weights.varies) {
-                output.notes.add(Category::Animation, object(), DEFORMS);
-            }
         }
         Ok(pose)
     }
 
-    /// Poses a mesh whose normals and tangents are as they are in the file. Returns where it hangs, if joints
-    /// move it.
+    /// Poses a mesh whose normals and tangents are as they are in the file.
     pub(super) fn apply(
         &self,
         source: &Source,
@@ -127,25 +140,63 @@ impl Poses {
         (pose, arrays): (&Pose, &Arrays),
         mesh: &mut Mesh,
         object: &str,
-    ) -> Result<Option<Hung>, Fault> {
-        let weights: Vec<f32> = pose.weights.iter().map(|&bits| f32::from_bits(bits)).collect();
-        if !weights.is_empty()
-            && let Err(problem) = morph::apply(output, arrays, &weights, mesh, object)?
-        {
-            let text = format!("{problem}; drawn without its morph targets");
-            output.notes.add(Category::Animation, object, text);
+    ) -> Result<Posed, Fault> {
+        let is_bound = pose.skin.is_some() && is_bound(arrays.attributes.primitive);
+        if pose.weights.is_empty() && !is_bound {
+            return Ok(Posed::default());
         }
-        let Some(skin) = pose.skin.filter(|_| is_bound(arrays.attributes.primitive)) else {
-            return Ok(None);
-        };
-        match skin::apply(source, output, (&self.rig, skin), arrays, mesh, object)? {
-            Ok(hung) => Ok(Some(hung)),
-            Err(problem) => {
-                let text = format!("{problem}; drawn in its rest pose");
-                output.notes.add(Category::Animation, object, text);
-                Ok(None)
+        let bytes = size_of::<(Vec3, Vec3, Vec4)>() * mesh.positions.len();
+        output.budget.take(bytes as u64, || object.to_string())?;
+        let shape = Shape::take(mesh);
+        let rest = shape.clone();
+        shape.put(mesh);
+        let (mut targets, mut weights) = (Vec::new(), Vec::new());
+        if !pose.weights.is_empty() {
+            let first: Vec<f32> = pose.weights.iter().map(|&bits| f32::from_bits(bits)).collect();
+            let all = pose.animated.is_some();
+            match morph::apply(output, arrays, (&first, all), mesh, object)? {
+                Ok(read) => (targets, weights) = (read, first),
+                Err(problem) => {
+                    let text = format!("{problem}; drawn without its morph targets");
+                    output.notes.add(Category::Animation, object, text);
+                }
             }
         }
+        let mut bound = None;
+        if let Some(skin) = pose.skin.filter(|_| is_bound) {
+            match skin::apply(source, output, (&self.rig, skin), arrays, mesh, object)? {
+                Ok(joints) => bound = Some(joints),
+                Err(problem) => {
+                    let text = format!("{problem}; drawn in its rest pose");
+                    output.notes.add(Category::Animation, object, text);
+                }
+            }
+        }
+        let hung = bound.as_ref().map(|bound| bound.hung);
+        let animated = pose.animated.filter(|_| !targets.is_empty());
+        let deforms = animated.is_some() || hung.is_some_and(|hung| hung.deforms);
+        let weights = match animated {
+            Some(node) => self.weights[&node].keys.clone(),
+            None => weights::constant(&weights),
+        };
+        let skin = bound.map(|bound| bound.skin);
+        let deformation = deforms.then_some(Deformation { rest, targets, weights, skin });
+        Ok(Posed { hung, deformation })
+    }
+}
+
+/// Lets only meshes deform that give no light.
+pub(super) fn settle(output: &mut Output) {
+    let scene = &mut output.scene;
+    let deforms = |mesh: u32| scene.meshes[mesh as usize].deformation.is_some();
+    let shines = |row: u32| scene.peak_rgb_of_instance(row).max_element() > 0.0;
+    let rows = (0..).zip(&scene.instances).filter(|(_, instance)| deforms(instance.mesh));
+    let lit: Vec<usize> =
+        rows.filter(|&(row, _)| shines(row)).map(|(row, _)| row as usize).collect();
+    for row in lit {
+        let instance = &scene.instances[row];
+        scene.meshes[instance.mesh as usize].deformation = None;
+        output.notes.add(Category::Animation, &*instance.path, KEEPS_SHAPE);
     }
 }
 
@@ -164,28 +215,14 @@ impl Pose {
     }
 }
 
-impl Hung {
-    /// Notes that a mesh deforms, if it does.
-    pub(super) fn note(&self, output: &mut Output, object: &str) {
-        if self.deforms {
-            output.notes.add(Category::Animation, object, DEFORMS);
-        }
-    }
-}
-
 /// Whether joints are to move a primitive.
 fn is_bound(primitive: &Primitive) -> bool {
     primitive.attributes.contains_key(&Checked::Valid(Semantic::Joints(0)))
 }
 
-/// For each vertex, whether a triangle uses it. Others may be anywhere, and follow nothing.
-fn used(mesh: &Mesh) -> Vec<bool> {
-    let mut used = vec![false; mesh.positions.len()];
+/// For each of so many vertices, whether a triangle uses it. Others may be anywhere, and follow nothing.
+fn used(mesh: &Mesh, count: usize) -> Vec<bool> {
+    let mut used = vec![false; count];
     mesh.triangles.as_flattened().iter().for_each(|&corner| used[corner as usize] = true);
     used
-}
-
-/// Whether a place can be calculated with.
-fn is_near(place: glam::DVec3) -> bool {
-    place.is_finite() && place.abs().max_element() < f64::from(FARTHEST_M)
 }

@@ -1,27 +1,32 @@
-//! Where joints are at the first frame.
+//! Where joints are.
 
 use crate::ingest::error::Fault;
+use crate::ingest::gltf::animation::byte_length;
 use crate::ingest::gltf::hierarchy::local;
 use crate::ingest::gltf::{Output, Source};
-use crate::scene::{Channel, Node};
+use crate::scene::{Channel, Node, Skeleton, Trs};
 use glam::DAffine3;
+use std::cell::RefCell;
 use std::collections::{HashMap, HashSet};
+use std::sync::Arc;
 
 /// The joints of all skins and the nodes above them, by their numbers in the file. Of a node with several
 /// parents it is the one that is placed first.
 #[derive(Default)]
 pub(super) struct Rig {
     nodes: HashMap<usize, Joint>,
+    skeletons: RefCell<HashMap<Place, Arc<Skeleton>>>,
 }
+
+/// A skin, and the node that its meshes hang at.
+type Place = (usize, Option<usize>);
 
 struct Joint {
     parent: Option<usize>,
     /// How many nodes are above it.
     depth: u32,
-    /// To its parent, at the first frame.
-    local: DAffine3,
-    /// Whether that is ever another.
-    moves: bool,
+    /// How it moves against its parent.
+    node: Node,
 }
 
 impl Rig {
@@ -39,8 +44,6 @@ impl Rig {
         let bytes = rows * (size_of::<(Option<usize>, bool, usize)>() + 2 * size_of::<Joint>());
         output.budget.take(bytes as u64, || "skins".to_string())?;
         let parents = parents(source);
-        let timeline = output.scene.timeline;
-        let first_s = timeline.seconds_at(timeline.first_frame);
         let mut rig = Rig::default();
         let joints = document.skins.iter().flat_map(|skin| &skin.joints);
         for joint in joints.map(|joint| joint.value()) {
@@ -55,13 +58,14 @@ impl Rig {
                 let parent = parents[&row];
                 let mut node =
                     Node::fixed("", None, local(&document.beside.transforms[row], |_| {}));
+                let keys = 2 * channels[row].iter().map(byte_length).sum::<u64>();
+                output.budget.take(keys, || "skins".to_string())?;
                 node.channels = channels[row].clone();
                 node.settle();
                 let joint = Joint {
                     parent,
                     depth: parent.map_or(0, |parent| rig.nodes[&parent].depth + 1),
-                    local: node.to_parent(first_s, timeline),
-                    moves: !node.channels.is_empty(),
+                    node,
                 };
                 rig.nodes.insert(row, joint);
             }
@@ -95,21 +99,52 @@ impl Rig {
     }
 
     /// The nodes from one up to another that is above it, without that one; all of them, if it is `None`.
-    fn path(&self, node: usize, below: Option<usize>) -> impl Iterator<Item = &Joint> {
-        let own = move |node: Option<usize>| {
-            node.filter(|_| node != below).map(|node| &self.nodes[&node])
-        };
-        std::iter::successors(own(Some(node)), move |joint| own(joint.parent))
-    }
-
-    /// From a node to another above it, or to the world, at the first frame.
-    pub(super) fn transform(&self, node: usize, to: Option<usize>) -> DAffine3 {
-        self.path(node, to).fold(DAffine3::IDENTITY, |below, joint| joint.local * below)
+    fn path(&self, node: usize, below: Option<usize>) -> impl Iterator<Item = usize> {
+        let own = move |node: Option<usize>| node.filter(|_| node != below);
+        std::iter::successors(own(Some(node)), move |node| own(self.nodes[node].parent))
     }
 
     /// Whether a node ever moves against another above it.
     pub(super) fn moves(&self, node: usize, against: Option<usize>) -> bool {
-        self.path(node, against).any(|joint| joint.moves)
+        self.path(node, against).any(|node| !self.nodes[&node].node.channels.is_empty())
+    }
+
+    /// The joints of a skin as they are below a node, or in the world. A joint that is not in the scene or not below
+    /// that node moves nothing.
+    pub(super) fn skeleton(
+        &self,
+        (skin, below): Place,
+        joints: &[usize],
+        inverse_bind: impl Fn(usize) -> DAffine3,
+    ) -> Arc<Skeleton> {
+        let mut skeletons = self.skeletons.borrow_mut();
+        let skeleton = skeletons.entry((skin, below)).or_insert_with(|| {
+            let (mut nodes, mut numbers) = (Vec::new(), HashMap::new());
+            let joint = |(number, &joint): (usize, &usize)| {
+                let is_below = self.has(joint) && self.meet(Some(joint), below) == below;
+                if !is_below {
+                    return None;
+                }
+                if Some(joint) == below {
+                    // The space itself.
+                    nodes.push(Node::fixed("", None, Trs::default()));
+                    return Some((nodes.len() as u32 - 1, inverse_bind(number)));
+                }
+                let path: Vec<usize> = self.path(joint, below).collect();
+                for &row in path.iter().rev() {
+                    if !numbers.contains_key(&row) {
+                        let parent = self.nodes[&row].parent;
+                        let parent = parent.and_then(|parent| numbers.get(&parent).copied());
+                        numbers.insert(row, nodes.len() as u32);
+                        nodes.push(Node { parent, ..self.nodes[&row].node.clone() });
+                    }
+                }
+                Some((numbers[&joint], inverse_bind(number)))
+            };
+            let joints = joints.iter().enumerate().map(joint).collect();
+            Arc::new(Skeleton { nodes, joints })
+        });
+        skeleton.clone()
     }
 }
 

@@ -2,13 +2,13 @@
 
 use super::influences::Influences;
 use super::rig::Rig;
-use super::{Arrays, Hung, is_near, used};
+use super::{Arrays, Hung, used};
 use crate::ingest::error::Fault;
 use crate::ingest::gltf::accessors::Accessor;
 use crate::ingest::gltf::{Output, Source};
-use crate::scene::{Category, Mesh};
-use glam::{DAffine3, DMat3, DMat4, Vec3};
-use gltf::json::Skin;
+use crate::scene::{Category, Mesh, Shape, Skin};
+use glam::{DAffine3, DMat4, Vec3, Vec4};
+use gltf::json::Skin as Row;
 use gltf::json::accessor::{ComponentType, Type};
 use std::collections::HashSet;
 
@@ -16,11 +16,12 @@ use std::collections::HashSet;
 const JOINT_BYTES: usize = 640;
 
 /// What a vertex takes beside its influences, while the mesh is moved.
-const VERTEX_BYTES: usize = size_of::<(bool, Vec3, Option<DAffine3>)>();
+const VERTEX_BYTES: usize = size_of::<(bool, u32, [Vec3; 2], Vec4)>();
 
-/// How a mesh was moved.
-struct Moved {
-    hung: Hung,
+/// How joints move a mesh.
+pub(super) struct Bound {
+    pub hung: Hung,
+    pub skin: Skin,
     /// Whether there are vertices without weights.
     has_free: bool,
 }
@@ -33,7 +34,7 @@ pub(super) fn apply(
     arrays: &Arrays,
     mesh: &mut Mesh,
     object: &str,
-) -> Result<Result<Hung, String>, Fault> {
+) -> Result<Result<Bound, String>, Fault> {
     let Some(row) = source.document.skins.get(skin) else {
         return Ok(Err("its skin is not in the file".into()));
     };
@@ -43,25 +44,26 @@ pub(super) fn apply(
     };
     let bytes = (JOINT_BYTES * row.joints.len()) as u64;
     output.budget.take(bytes, || object.to_string())?;
-    let bytes = ((VERTEX_BYTES + of_influences) * mesh.positions.len()) as u64;
+    let bytes = ((VERTEX_BYTES + 2 * of_influences) * mesh.positions.len()) as u64;
     output.budget.take(bytes, || object.to_string())?;
-    let moved = moved(source, (rig, row), arrays, mesh);
-    output.budget.put_back(bytes);
-    Ok(moved.map(|Moved { hung, has_free }| {
-        if has_free {
-            let text = "has vertices without weights of joints; they follow their first joint";
-            output.notes.add(Category::Animation, object, text);
-        }
-        hung
-    }))
+    let bound = bind(source, (rig, skin, row), arrays, mesh);
+    let bound = bound.and_then(|bound| bend(mesh, &bound.skin, output).map(|()| bound));
+    if !bound.as_ref().is_ok_and(|bound| bound.hung.deforms) {
+        output.budget.put_back(bytes);
+    }
+    if bound.as_ref().is_ok_and(|bound| bound.has_free) {
+        let text = "has vertices without weights of joints; they follow their first joint";
+        output.notes.add(Category::Animation, object, text);
+    }
+    Ok(bound)
 }
 
-fn moved(
+fn bind(
     source: &Source,
-    (rig, row): (&Rig, &Skin),
+    (rig, number, row): (&Rig, usize, &Row),
     arrays: &Arrays,
-    mesh: &mut Mesh,
-) -> Result<Moved, String> {
+    mesh: &Mesh,
+) -> Result<Bound, String> {
     let nodes: Vec<usize> = row.joints.iter().map(|joint| joint.value()).collect();
     let inverse_bind = row.inverse_bind_matrices.map(|index| source.accessors.get(index));
     let inverse_bind = inverse_bind
@@ -70,57 +72,50 @@ fn moved(
     if inverse_bind.is_some_and(|accessor| !is_matrices(accessor, nodes.len())) {
         return Err("its skin has no inverse bind matrix for each joint".into());
     }
-    let influences = Influences::read(arrays)?;
-    let used = used(mesh);
+    let inverse_bind = |joint: usize| {
+        inverse_bind.map_or(DAffine3::IDENTITY, |accessor| {
+            let columns = accessor.matrix(joint).map(f64::from);
+            DAffine3::from_mat4(DMat4::from_cols_array(&columns))
+        })
+    };
+    let read = Influences::read(arrays)?;
+    let (mut ends, mut influences) = (Vec::with_capacity(mesh.positions.len()), Vec::new());
     let mut moves = vec![false; nodes.len()];
     let mut has_free = false;
-    for vertex in (0..used.len()).filter(|&vertex| used[vertex]) {
-        has_free |= influences.is_free(vertex);
-        for (joint, _) in influences.of(vertex) {
-            *moves.get_mut(joint).ok_or("has a joint that its skin does not have")? = true;
+    for (vertex, used) in used(mesh, mesh.positions.len()).into_iter().enumerate() {
+        if used {
+            has_free |= read.is_free(vertex);
+            for (joint, weight) in read.of(vertex) {
+                *moves.get_mut(joint).ok_or("has a joint that its skin does not have")? = true;
+                influences.push((joint as u32, weight));
+            }
         }
+        ends.push(influences.len() as u32);
     }
     let moving: Vec<usize> = (0..nodes.len()).filter(|&joint| moves[joint]).collect();
     if moving.iter().any(|&joint| !rig.has(nodes[joint])) {
         return Err("its skin has joints that are not in the scene".into());
     }
     let hung = hang(rig, &nodes, &moving);
-    let mut matrices = vec![DAffine3::ZERO; nodes.len()];
-    for joint in moving {
-        let inverse_bind = inverse_bind.map_or(DAffine3::IDENTITY, |accessor| {
-            let columns = accessor.matrix(joint).map(f64::from);
-            DAffine3::from_mat4(DMat4::from_cols_array(&columns))
-        });
-        matrices[joint] = rig.transform(nodes[joint], hung.below) * inverse_bind;
-    }
-    let of_vertices: Vec<Option<DAffine3>> = used
-        .iter()
-        .enumerate()
-        .map(|(vertex, used)| used.then(|| blend(&matrices, influences.of(vertex))))
-        .collect();
-    bend(mesh, &of_vertices)?;
-    Ok(Moved { hung, has_free })
+    let skeleton = rig.skeleton((number, hung.below), &nodes, inverse_bind);
+    Ok(Bound { hung, skin: Skin { skeleton, ends, influences }, has_free })
 }
 
-/// Moves each vertex that has a matrix; else says that it goes too far, and moves none.
-fn bend(mesh: &mut Mesh, matrices: &[Option<DAffine3>]) -> Result<(), String> {
-    let mut places = mesh.positions.clone();
-    for (place, matrix) in places.iter_mut().zip(matrices) {
-        let Some(matrix) = matrix else { continue };
-        let moved = matrix.transform_point3(place.as_dvec3());
-        if !is_near(moved) {
-            return Err("its skin leads out of all bounds".into());
-        }
-        *place = moved.as_vec3();
+/// Moves each vertex that joints move, as at the first frame; else says that one goes too far, and moves none.
+fn bend(mesh: &mut Mesh, skin: &Skin, output: &Output) -> Result<(), String> {
+    let timeline = output.scene.timeline;
+    let joints = skin.skeleton.at(timeline.seconds_at(timeline.first_frame), timeline);
+    let rest = Shape::take(mesh);
+    let mut bent = rest.clone();
+    if !skin.bend(&mut bent, &joints) {
+        rest.put(mesh);
+        return Err("its skin leads out of all bounds".into());
     }
-    mesh.positions = places;
-    for (vertex, matrix) in matrices.iter().enumerate() {
-        if let Some(matrix) = matrix {
-            turn(mesh, vertex, matrix.matrix3);
-        }
-    }
+    bent.put(mesh);
+    // Where joints mirror, triangles are turned over, so that their fronts stay fronts.
     let mirrors = |vertex: u32| {
-        matrices[vertex as usize].is_some_and(|matrix| matrix.matrix3.determinant() < 0.0)
+        let matrix = skin.matrix(vertex as usize, &joints);
+        matrix.is_some_and(|matrix| matrix.matrix3.determinant() < 0.0)
     };
     for triangle in &mut mesh.triangles {
         if triangle.iter().filter(|&&vertex| mirrors(vertex)).count() > 1 {
@@ -147,30 +142,4 @@ fn hang(rig: &Rig, nodes: &[usize], moving: &[usize]) -> Hung {
     }
     let skeleton: HashSet<usize> = nodes.iter().copied().collect();
     Hung { below: rig.above(common, &skeleton), deforms: true }
-}
-
-/// The mean of the matrices of joints.
-fn blend(matrices: &[DAffine3], influences: impl Iterator<Item = (usize, f64)>) -> DAffine3 {
-    let mut mean = DAffine3::ZERO;
-    for (joint, weight) in influences {
-        mean.matrix3 += matrices[joint].matrix3 * weight;
-        mean.translation += matrices[joint].translation * weight;
-    }
-    mean
-}
-
-/// Turns the normal and the tangent of a vertex.
-fn turn(mesh: &mut Mesh, vertex: usize, matrix: DMat3) {
-    let [x, y, z] = [matrix.x_axis, matrix.y_axis, matrix.z_axis];
-    let sign = if matrix.determinant() < 0.0 { -1.0 } else { 1.0 };
-    if let Some(normal) = mesh.normals.get_mut(vertex) {
-        let cofactors = DMat3::from_cols(y.cross(z), z.cross(x), x.cross(y));
-        let turned = cofactors * normal.as_dvec3() * sign;
-        // Scaled, for 32 bits may not hold the cofactors of a small matrix.
-        *normal = (turned / turned.abs().max_element()).as_vec3();
-    }
-    if let Some(tangent) = mesh.tangents.get_mut(vertex) {
-        let turned = matrix * tangent.truncate().as_dvec3();
-        *tangent = turned.as_vec3().extend(tangent.w * sign as f32);
-    }
 }
