@@ -1,7 +1,10 @@
-//! Who takes part: a way of picking lights, with a number of samples.
+//! Who takes part: a way of picking lights, with a number of samples or an error.
 
+use crate::render::noise::Grey;
+use crate::render::passes::ErrorGoal;
 use crate::render::{LightStrategy, RenderSettings, Split, SplitBy};
 use serde::{Deserialize, Serialize};
+use std::cmp::Ordering;
 use std::fmt;
 use std::str::FromStr;
 use thiserror::Error;
@@ -18,29 +21,41 @@ pub struct Way {
     pub split_by: SplitBy,
 }
 
-/// A way with a budget, displayed as it is written: `tree:0.5@16`.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+/// What ends a picture; displayed as it is written.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Budget {
+    /// So many samples in each pixel: a whole number.
+    Samples(u32),
+    /// The error of the picture is as small as this, below 1, with 95 % certainty. Samples go where the error is
+    /// ([`ToError`](crate::render::passes::ToError)).
+    Error(f64),
+}
+
+/// A way with a budget, displayed as it is written: `tree:0.5@16`, `tree@0.05`.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Entrant {
     /// How lights are picked.
     pub way: Way,
-    /// Samples of each pixel.
-    pub samples: u32,
+    /// What ends a picture. A [`Row`](super::Row) tells both what was asked for and what was taken.
+    #[serde(skip)]
+    pub budget: Budget,
 }
 
-/// What a user wrote: a way, and samples if they are given.
+/// What a user wrote: a way, and a budget if one is given.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Asked {
     /// How lights are picked.
     pub way: Way,
-    /// Samples of each pixel; every budget if not given.
-    pub samples: Option<u32>,
+    /// What ends a picture; all numbers of samples that are tried if not given.
+    pub budget: Option<Budget>,
 }
 
 /// A text that is no entrant.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[error(
-    "'{0}' is not STRATEGY[:SPLIT[:TEST]][@SAMPLES]; the strategy is uniform, power, distance, tree, \
-     exhaustive or all, SPLIT a number from 0 to 1 or auto, TEST variance or solid-angle, SAMPLES at least 1"
+    "'{0}' is not STRATEGY[:SPLIT[:TEST]][@SAMPLES or @ERROR]; the strategy is uniform, power, distance, tree, \
+     exhaustive or all, SPLIT a number from 0 to 1 or auto, TEST variance or solid-angle, SAMPLES a whole \
+     number, at least 1, ERROR from 0.0001 to below 1"
 )]
 pub struct NoEntrant(String);
 
@@ -71,12 +86,54 @@ impl Way {
     }
 }
 
+impl Budget {
+    /// The error that is asked for, if one is.
+    pub fn error(self) -> Option<f64> {
+        match self {
+            Budget::Samples(_) => None,
+            Budget::Error(error) => Some(error),
+        }
+    }
+
+    /// The number of samples that is asked for, if one is.
+    pub fn samples(self) -> Option<u32> {
+        match self {
+            Budget::Samples(samples) => Some(samples),
+            Budget::Error(_) => None,
+        }
+    }
+
+    /// From little work to much: numbers of samples, then errors.
+    pub fn by_work(&self, other: &Budget) -> Ordering {
+        match (self, other) {
+            (Budget::Samples(a), Budget::Samples(b)) => a.cmp(b),
+            (Budget::Error(a), Budget::Error(b)) => b.total_cmp(a),
+            (Budget::Samples(_), Budget::Error(_)) => Ordering::Less,
+            (Budget::Error(_), Budget::Samples(_)) => Ordering::Greater,
+        }
+    }
+
+    fn read(text: &str) -> Option<Budget> {
+        if let Ok(samples) = text.parse() {
+            return Some(Budget::Samples(samples)).filter(|_| samples > 0);
+        }
+        let error = text.parse().ok().filter(|error| (1e-4..1.0).contains(error))?;
+        Some(Budget::Error(error))
+    }
+}
+
 impl Entrant {
+    /// What is asked of the noise, if anything is. No pixel gets more than `most` samples.
+    pub fn goal(&self, grey: Grey, most: u32) -> Option<ErrorGoal> {
+        Some(ErrorGoal { error: self.budget.error()?, grey, most })
+    }
+
     /// The settings that it renders with, but for its seed. Where its knob is left open it is that of `base`.
     pub fn settings(&self, base: &RenderSettings) -> RenderSettings {
         let Way { strategy, split, split_by } = self.way;
         let split = if split == Split::Auto { base.split } else { split };
-        RenderSettings { samples: self.samples, strategy, split, split_by, ..base.clone() }
+        let samples = self.budget.samples().unwrap_or(base.samples);
+        RenderSettings { samples, strategy, split, split_by, ..base.clone() }
     }
 }
 
@@ -92,9 +149,18 @@ impl fmt::Display for Way {
     }
 }
 
+impl fmt::Display for Budget {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Budget::Samples(samples) => samples.fmt(f),
+            Budget::Error(error) => error.fmt(f),
+        }
+    }
+}
+
 impl fmt::Display for Entrant {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}@{}", self.way, self.samples)
+        write!(f, "{}@{}", self.way, self.budget)
     }
 }
 
@@ -118,8 +184,8 @@ impl FromStr for Asked {
 }
 
 fn read(text: &str) -> Option<Asked> {
-    let (how, samples) = match text.split_once('@') {
-        Some((how, samples)) => (how, Some(samples.parse().ok().filter(|&samples| samples > 0)?)),
+    let (how, budget) = match text.split_once('@') {
+        Some((how, budget)) => (how, Some(Budget::read(budget)?)),
         None => (text, None),
     };
     let mut parts = how.split(':');
@@ -135,7 +201,7 @@ fn read(text: &str) -> Option<Asked> {
         None => SplitBy::Variance,
     };
     let way = Way { split_by, ..Way::new(strategy, split) };
-    parts.next().is_none().then_some(Asked { way, samples })
+    parts.next().is_none().then_some(Asked { way, budget })
 }
 
 #[cfg(test)]
@@ -153,9 +219,13 @@ mod tests {
             "distance:1",
         ] {
             let asked: Asked = text.parse().unwrap();
-            assert_eq!((asked.way.to_string(), asked.samples), (text.into(), None));
-            let entrant: Asked = format!("{text}@24").parse().unwrap();
-            assert_eq!((entrant.way, entrant.samples), (asked.way, Some(24)));
+            assert_eq!((asked.way.to_string(), asked.budget), (text.into(), None));
+            for (end, budget) in [("24", Budget::Samples(24)), ("0.05", Budget::Error(0.05))] {
+                let text = format!("{text}@{end}");
+                let entrant: Asked = text.parse().unwrap();
+                assert_eq!((entrant.way, entrant.budget), (asked.way, Some(budget)));
+                assert_eq!(Entrant { way: asked.way, budget }.to_string(), text);
+            }
         }
     }
 
@@ -163,7 +233,10 @@ mod tests {
     fn nonsense_is_told_with_the_remedy() {
         let wrong =
             ["", "trees", "tree:nan", "tree:2", "uniform:0.5", "tree:0.5:x", "tree:1:variance:1"];
-        for text in wrong.into_iter().chain(["tree@", "tree@0", "tree@-4", "tree@x"]) {
+        for text in wrong
+            .into_iter()
+            .chain(["tree@", "tree@0", "tree@-4", "tree@x", "tree@1.5", "tree@0.0", "tree@nan"])
+        {
             let error = text.parse::<Asked>().unwrap_err().to_string();
             assert!(error.contains("STRATEGY[:SPLIT") && error.contains(text), "{error}");
         }

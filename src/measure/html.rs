@@ -83,9 +83,9 @@ fn label(row: &Row) -> String {
 
 fn chart(trade: &Trade) -> Chart {
     let curves = trade.curves.iter().enumerate().map(|(number, curve)| {
-        let own = trade.rows.iter().filter(|row| row.entrant.way == curve.way);
+        let own = trade.rows.iter().filter(|row| row.is_of(curve));
         let mut own: Vec<&Row> = own.collect();
-        own.sort_by_key(|row| row.entrant.samples);
+        own.sort_by_key(|row| row.samples);
         let dot = |row: &&Row| Dot {
             at: [row.seconds, row.error],
             range: (trade.terms.seeds > 1).then_some(row.errors),
@@ -100,7 +100,7 @@ fn chart(trade: &Trade) -> Chart {
         }
     });
     Chart {
-        caption: "Each dot is one budget of samples; lower and further left is better. Dots that no other \
+        caption: "Each dot is one number of samples, or one error that is asked for; lower and further left is better. Dots that no other \
                   beats are ringed and joined by the broad line."
             .into(),
         axes: ["seconds a picture".into(), "error".into()],
@@ -158,11 +158,10 @@ fn budgets(trade: &Trade) -> Table {
     columns.extend(headings.map(Column::number));
     columns.extend([Column::number("lights"), Column::text("frontier")]);
     let rows = trade.rows.iter().map(|row| {
-        let ink = trade.curves.iter().position(|curve| curve.way == row.entrant.way).unwrap_or(0);
-        let mut cells = vec![
-            Cell::Key(INKS[ink % INKS.len()], row.entrant.way.to_string()),
-            Cell::count(row.entrant.samples as usize),
-        ];
+        let ink = trade.curves.iter().position(|curve| row.is_of(curve)).unwrap_or(0);
+        let name = if row.asked.is_some() { row.name.clone() } else { row.entrant.way.to_string() };
+        let mut cells =
+            vec![Cell::Key(INKS[ink % INKS.len()], name), Cell::count(row.samples as usize)];
         cells.extend([row.seconds, row.error].map(Cell::short));
         cells.push(row.decibels.map_or(Cell::Empty, Cell::short));
         cells.extend([row.errors[0], row.errors[1], row.worst_percent].map(Cell::short));

@@ -40,7 +40,7 @@ mod trade;
 
 pub use cache::Cache;
 pub use direct::direct_light;
-pub use entrant::{Asked, Entrant, NoEntrant, Way};
+pub use entrant::{Asked, Budget, Entrant, NoEntrant, Way};
 pub use frontier::{Point, Reach};
 pub use html::{html, svg};
 pub use machine::Machine;

@@ -3,6 +3,7 @@
 use crate::light_tree::LightTree;
 use crate::math::color::luminance;
 use crate::render::beauty::Beauty;
+use crate::render::passes::{Control, ErrorGoal, ToError, Uniform};
 use crate::render::{Progress, RenderDelegate, RenderError, RenderSettings};
 use std::time::Instant;
 
@@ -24,6 +25,8 @@ pub struct Picture {
     pub beauty: Beauty,
     /// Seconds from the settings to the last pixel.
     pub seconds: f64,
+    /// Samples of a pixel, in the mean.
+    pub samples: f64,
     /// Lights sampled for a path, in the mean.
     pub lights: f64,
     /// Samples left out because they were infinite or no number.
@@ -31,25 +34,32 @@ pub struct Picture {
 }
 
 impl<D: AsRef<[u8]>> Subject<'_, '_, D> {
-    /// Renders the frame.
+    /// Renders the frame: to a goal, or without one with the samples of the settings in every pixel.
     ///
     /// # Errors
     /// If the tree lacks the frame, the settings do not fit the scene, or `progress` stops it.
     pub fn render(
         &mut self,
         settings: RenderSettings,
+        goal: Option<ErrorGoal>,
         progress: &impl Progress,
     ) -> Result<Picture, RenderError> {
         let settings = RenderSettings { aovs: Vec::new(), float_beauty: true, ..settings };
-        let paths = f64::from(settings.width) * f64::from(settings.height);
-        let paths = paths * f64::from(settings.samples);
+        let mut even = Uniform(settings.samples);
+        let mut to_error = goal.map(ToError::new);
+        let control: &mut dyn Control = match &mut to_error {
+            Some(control) => control,
+            None => &mut even,
+        };
         let started = Instant::now();
         self.delegate.set_settings(settings);
-        let frame = self.delegate.render(self.tree, self.frame, progress)?;
+        let mut film = self.delegate.film()?;
+        let frame = self.delegate.expose(self.tree, self.frame, &mut film, control, progress)?;
         Ok(Picture {
             seconds: started.elapsed().as_secs_f64(),
             beauty: Beauty::of(&frame.buffers, true),
-            lights: frame.stats.trace.light_picks as f64 / paths,
+            samples: film.samples() as f64 / film.taken().len() as f64,
+            lights: frame.stats.trace.light_picks as f64 / film.samples().max(1) as f64,
             non_finite: frame.stats.non_finite,
         })
     }

@@ -68,9 +68,14 @@ pub struct Trade {
 pub struct Row {
     /// What it is called.
     pub name: String,
-    /// Its way and its samples.
+    /// Its way.
     #[serde(flatten)]
     pub entrant: Entrant,
+    /// Samples of a pixel, in the mean over pixels and seeds, rounded.
+    pub samples: u32,
+    /// The error that was asked for, if that and not a number of samples was.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub asked: Option<f64>,
     /// Seconds a picture, the median.
     pub seconds: f64,
     /// Its error: the root of the mean squared error over all seeds.
@@ -91,7 +96,7 @@ pub struct Row {
     pub is_on_frontier: bool,
 }
 
-/// All budgets of one way.
+/// All budgets of one way: numbers of samples, or errors.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Curve {
     /// What it is called.
@@ -99,6 +104,8 @@ pub struct Curve {
     /// The way.
     #[serde(flatten)]
     pub way: Way,
+    /// Whether its budgets are errors.
+    pub to_error: bool,
     /// The exponent of time in its error.
     pub slope: Option<f64>,
     /// What the error that was asked for takes.
@@ -125,6 +132,8 @@ impl Row {
         Row {
             name: entrant.to_string(),
             entrant,
+            samples: (sum(|cell| cell.samples) / count).round() as u32,
+            asked: entrant.budget.error(),
             seconds: median(cells.iter().map(|cell| cell.seconds)),
             error,
             decibels: Some(decibels(error)).filter(|decibels| decibels.is_finite()),
@@ -139,8 +148,18 @@ impl Row {
 
     /// Its place among the curves.
     pub fn point(&self) -> Point {
-        let Row { seconds, error, entrant, .. } = *self;
-        Point { samples: entrant.samples.into(), seconds, error }
+        let Row { samples, seconds, error, .. } = *self;
+        Point { samples: samples.into(), seconds, error }
+    }
+
+    /// What its curve is of: its way, and whether an error was asked for.
+    fn kind(&self) -> (Way, bool) {
+        (self.entrant.way, self.asked.is_some())
+    }
+
+    /// Whether it belongs to a curve.
+    pub fn is_of(&self, curve: &Curve) -> bool {
+        self.kind() == (curve.way, curve.to_error)
     }
 }
 
@@ -150,19 +169,20 @@ impl Trade {
         let error = terms.error;
         let points: Vec<Point> = rows.iter().map(Row::point).collect();
         rows.iter_mut().zip(frontier(&points)).for_each(|(row, is_on)| row.is_on_frontier = is_on);
-        let mut ways: Vec<Way> = Vec::new();
+        let mut kinds: Vec<(Way, bool)> = Vec::new();
         for row in &rows {
-            if !ways.contains(&row.entrant.way) {
-                ways.push(row.entrant.way);
+            if !kinds.contains(&row.kind()) {
+                kinds.push(row.kind());
             }
         }
-        rows.sort_by_key(|row| ways.iter().position(|way| *way == row.entrant.way));
-        let curve = |way: &Way| {
-            let points = points_of(&rows, way);
+        rows.sort_by_key(|row| kinds.iter().position(|kind| *kind == row.kind()));
+        let curve = |&(way, to_error): &(Way, bool)| {
+            let points = points_of(&rows, (way, to_error));
             let (slope, reach) = (slope(&points), reach(&points, error));
-            Curve { name: way.to_string(), way: *way, slope, reach }
+            let name = if to_error { format!("{way} --error") } else { way.to_string() };
+            Curve { name, way, to_error, slope, reach }
         };
-        let curves: Vec<Curve> = ways.iter().map(curve).collect();
+        let curves: Vec<Curve> = kinds.iter().map(curve).collect();
         Trade { recommendation: recommendation(&curves, error, settings), terms, rows, curves }
     }
 
@@ -170,7 +190,7 @@ impl Trade {
     /// of the quickest way.
     pub fn at_equal_times(&self) -> Vec<Entrant> {
         let of = |curve: &Curve| -> Vec<&Row> {
-            self.rows.iter().filter(|row| row.entrant.way == curve.way).collect()
+            self.rows.iter().filter(|row| row.is_of(curve)).collect()
         };
         let longest = |curve| of(curve).iter().map(|row| row.seconds).fold(0.0, f64::max);
         let common = self.curves.iter().map(longest).fold(f64::INFINITY, f64::min);
@@ -182,8 +202,8 @@ impl Trade {
     }
 }
 
-fn points_of(rows: &[Row], way: &Way) -> Vec<Point> {
-    let own = rows.iter().filter(|row| row.entrant.way == *way);
+fn points_of(rows: &[Row], kind: (Way, bool)) -> Vec<Point> {
+    let own = rows.iter().filter(|row| row.kind() == kind);
     let mut points: Vec<Point> = own.map(Row::point).collect();
     points.sort_by(|a, b| a.samples.total_cmp(&b.samples));
     points
@@ -228,7 +248,7 @@ fn median(values: impl Iterator<Item = f64>) -> f64 {
 pub fn csv(trade: &Trade) -> String {
     let mut text = String::from(
         "strategy,split,split_by,samples,seconds,error,decibels,least_error,largest_error,\
-         worst_percent,mean_off,lights,on_frontier\n",
+         worst_percent,mean_off,lights,on_frontier,asked\n",
     );
     let word = |value: serde_json::Result<serde_json::Value>| match value {
         Ok(serde_json::Value::String(word)) => word,
@@ -238,13 +258,15 @@ pub fn csv(trade: &Trade) -> String {
         let Way { strategy, split, split_by } = row.entrant.way;
         let (strategy, by) =
             (word(serde_json::to_value(strategy)), word(serde_json::to_value(split_by)));
-        let (samples, decibels) =
-            (row.entrant.samples, row.decibels.map_or(String::new(), |d| d.to_string()));
+        let [decibels, asked] =
+            [row.decibels, row.asked].map(|own| own.map_or(String::new(), |own| own.to_string()));
         let [least, largest] = row.errors;
-        let Row { seconds, error, worst_percent, mean_off, lights, is_on_frontier, .. } = row;
+        let Row {
+            samples, seconds, error, worst_percent, mean_off, lights, is_on_frontier, ..
+        } = row;
         text += &format!(
             "{strategy},{split},{by},{samples},{seconds},{error},{decibels},{least},{largest},\
-             {worst_percent},{mean_off},{lights},{is_on_frontier}\n"
+             {worst_percent},{mean_off},{lights},{is_on_frontier},{asked}\n"
         );
     }
     text
@@ -253,10 +275,12 @@ pub fn csv(trade: &Trade) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::measure::Budget;
     use crate::render::LightStrategy;
 
     fn row(strategy: LightStrategy, samples: u32, seconds: f64, errors: [f64; 2]) -> Row {
         let cells = errors.map(|error| Cell {
+            samples: samples.into(),
             seconds,
             error,
             worst_percent: error,
@@ -264,7 +288,8 @@ mod tests {
             lights: 1.0,
             non_finite: 0,
         });
-        Row::of(Entrant { way: Way::new(strategy, 0.5), samples }, &cells)
+        let budget = Budget::Samples(samples);
+        Row::of(Entrant { way: Way::new(strategy, 0.5), budget }, &cells)
     }
 
     fn example() -> Trade {
@@ -307,6 +332,38 @@ mod tests {
         assert_eq!(on, [true, false, true, true]);
     }
 
+    /// What asks for errors is a curve of its own, beside the same way with numbers of samples.
+    #[test]
+    fn errors_that_are_asked_for_are_a_curve() {
+        let mut rows = example().rows;
+        for row in rows.iter_mut().filter(|row| row.entrant.way.strategy == LightStrategy::Power) {
+            let budget = Budget::Error(row.error);
+            let cell = Cell {
+                samples: 2.5 * f64::from(row.samples),
+                seconds: row.seconds,
+                error: 0.9 * row.error,
+                worst_percent: 0.0,
+                mean_off: 0.0,
+                lights: 1.0,
+                non_finite: 0,
+            };
+            let way = Way::new(LightStrategy::Tree, 0.5);
+            *row = Row::of(Entrant { way, budget }, &[cell, cell]);
+        }
+        let trade = Trade::new(rows, example().terms, &RenderSettings::default());
+        let names: Vec<&str> = trade.curves.iter().map(|curve| &*curve.name).collect();
+        assert_eq!(names, ["tree:0.5 --error", "tree:0.5"]);
+        let own: Vec<&Row> = trade.rows.iter().filter(|row| row.is_of(&trade.curves[0])).collect();
+        let told: Vec<(&str, u32)> = own.iter().map(|row| (&*row.name, row.samples)).collect();
+        assert_eq!(told, [("tree:0.5@0.4", 10), ("tree:0.5@0.2", 40)]);
+        assert!(csv(&trade).lines().nth(1).unwrap().ends_with(",0.4"));
+        let json = serde_json::to_value(&trade).unwrap();
+        assert_eq!(json["rows"][0]["asked"], 0.4);
+        assert_eq!(json["rows"][2].get("asked"), None);
+        let shown: Vec<String> = trade.at_equal_times().iter().map(Entrant::to_string).collect();
+        assert_eq!(shown, ["tree:0.5@0.2", "tree:0.5@4"]);
+    }
+
     #[test]
     fn pictures_that_are_shown_took_about_as_long() {
         let names: Vec<String> =
@@ -318,7 +375,7 @@ mod tests {
     fn a_line_of_csv_has_a_value_for_every_heading() {
         let text = csv(&example());
         let counts: Vec<usize> = text.lines().map(|line| line.split(',').count()).collect();
-        assert_eq!(counts, [13; 5]);
+        assert_eq!(counts, [14; 5]);
         assert!(
             text.lines().nth(3).unwrap().starts_with("tree,0.5,variance,4,2,0.1,20,"),
             "{text}"

@@ -6,7 +6,7 @@
 //! few samples carry much of the light.
 
 use super::cache::Cache;
-use super::entrant::Entrant;
+use super::entrant::{Budget, Entrant};
 use super::picture::{Picture, Subject, luminances};
 use super::reference::Converged;
 use super::report::Row;
@@ -30,6 +30,8 @@ pub struct TradeOptions {
     pub reference_samples: u32,
     /// The grey floor, if it is not to follow from the reference.
     pub grey: Option<Grey>,
+    /// Where an error is asked for, no pixel gets more samples.
+    pub most: u32,
     /// Lights in the scene: ways that look at each of them are expected to take longer.
     pub lights: usize,
 }
@@ -58,6 +60,8 @@ pub enum TradeError {
 /// What was measured of one picture.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Cell {
+    /// Samples of a pixel, in the mean.
+    pub samples: f64,
     /// Seconds it took.
     pub seconds: f64,
     /// Its error.
@@ -138,8 +142,9 @@ pub fn trade<D: AsRef<[u8]>>(
             let cell = match cache.result(&name) {
                 Some(cell) => cell,
                 None => {
-                    let picture =
-                        subject.render(settings_of(entrant, subject, number), &account)?;
+                    let settings = settings_of(entrant, subject, number);
+                    let goal = entrant.goal(converged.grey, options.most);
+                    let picture = subject.render(settings, goal, &account)?;
                     let cell = of_picture(&picture, &converged);
                     cache.keep_result(&name, &cell)?;
                     cell
@@ -153,18 +158,20 @@ pub fn trade<D: AsRef<[u8]>>(
 }
 
 /// A picture of an entrant, the one of its first seed. It is rendered again: the same input gives the same
-/// bytes, and times do not matter here.
+/// bytes, and times do not matter here. The grey floor and the most samples of a pixel are those of the trade.
 ///
 /// # Errors
 /// As for every picture.
 pub fn again<D: AsRef<[u8]>>(
     subject: &mut Subject<D>,
     entrant: &Entrant,
+    (grey, most): (Grey, u32),
     onlooker: &dyn Onlooker,
 ) -> Result<Beauty, RenderError> {
     let mut account = Account::new(onlooker, 1.0);
     account.begin("pictures for the page", 1.0);
-    Ok(subject.render(settings_of(entrant, subject, 0), &account)?.beauty)
+    let goal = entrant.goal(grey, most);
+    Ok(subject.render(settings_of(entrant, subject, 0), goal, &account)?.beauty)
 }
 
 fn settings_of<D>(entrant: &Entrant, subject: &Subject<D>, number: u32) -> RenderSettings {
@@ -190,7 +197,7 @@ fn converge<D: AsRef<[u8]>>(
         // Seeds that no entrant has.
         let seed = hash(!subject.base.seed, number);
         let settings = RenderSettings { samples, seed, ..subject.base.clone() };
-        let picture = subject.render(settings, account)?.beauty;
+        let picture = subject.render(settings, None, account)?.beauty;
         cache.keep_picture(&name, &picture)?;
         Ok::<_, TradeError>(picture)
     };
@@ -200,6 +207,7 @@ fn converge<D: AsRef<[u8]>>(
 fn of_picture(picture: &Picture, converged: &Converged) -> Cell {
     let found = converged.reference.compare(&luminances(&picture.beauty), converged.grey);
     Cell {
+        samples: picture.samples,
         seconds: picture.seconds,
         error: found.error,
         worst_percent: found.worst_percent,
@@ -216,5 +224,9 @@ fn weight(entrant: &Entrant, lights: usize) -> f64 {
         _ if entrant.way.split != Split::Fixed(0.0) => 2.0,
         _ => 1.0,
     };
-    each * f64::from(entrant.samples)
+    each * match entrant.budget {
+        Budget::Samples(samples) => f64::from(samples),
+        // About as many as a scene of many lights takes.
+        Budget::Error(error) => (0.5 / error).powi(2),
+    }
 }

@@ -81,6 +81,28 @@ fn a_second_run_renders_nothing_unless_it_is_told_to() {
     assert_ne!(errors(&report(&shot, ways)), errors(&first));
 }
 
+/// What an error buys stands beside numbers of samples, in every form.
+#[test]
+fn an_error_can_be_asked_for_in_the_place_of_samples() {
+    let shot = Shot::still();
+    let told = shot
+        .candelabra(&format!("measure {SCENE} {SMALL} tree tree@0.5 --csv r.csv --html r.html"))
+        .ends(0)
+        .says("tree@0.5 ")
+        .says("tree --error ");
+    assert!(told.out.contains("\ntree "), "{}", told.out);
+    let text = |name: &str| String::from_utf8(shot.read(name)).unwrap();
+    let csv = text("r.csv");
+    let ends: Vec<&str> =
+        csv.lines().skip(1).map(|line| line.rsplit(',').next().unwrap()).collect();
+    assert_eq!(ends, ["", "", "0.5"]);
+    assert!(text("r.html").contains("tree --error") && text("r.html").contains("tree@0.5"));
+    let rows = report(&shot, "tree tree@0.5")["trade"]["rows"].clone();
+    assert_eq!((&rows[0]["samples"], rows[0].get("asked")), (&2.into(), None));
+    assert_eq!(rows[2]["asked"], 0.5);
+    assert!(rows[2]["samples"].as_u64().unwrap() >= 8, "{rows}");
+}
+
 #[test]
 fn exact_variances_alone_render_and_keep_nothing() {
     let shot = Shot::still();
@@ -107,6 +129,7 @@ fn nonsense_is_refused_before_any_work() {
         "trees",
         "tree:nan",
         "tree@0",
+        "tree@1.5",
         "uniform:0.5",
         "--error 0",
         "--error nan",

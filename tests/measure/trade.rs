@@ -3,7 +3,7 @@
 use crate::scenes::spiral_points;
 use crate::stage::{Set, Stage};
 use candelabra::measure::{
-    Cache, Converged, Entrant, Machine, Onlooker, Row, Subject, Terms, Trade, TradeError,
+    Budget, Cache, Converged, Entrant, Machine, Onlooker, Row, Subject, Terms, Trade, TradeError,
     TradeOptions, Way, trade,
 };
 use candelabra::render::{LightStrategy, RenderDelegate, RenderError, RenderSettings};
@@ -39,9 +39,11 @@ fn patience(most: usize) -> Patience {
 
 fn options() -> TradeOptions {
     let ways = [Way::new(LightStrategy::Uniform, 0.0), Way::new(LightStrategy::Tree, 0.0)];
-    let entrant = |samples| move |way| Entrant { way, samples };
-    let entrants = [4, 16].into_iter().flat_map(|samples| ways.map(entrant(samples))).collect();
-    TradeOptions { entrants, seeds: 2, reference_samples: 256, grey: None, lights: 200 }
+    let entrant = |samples| move |way| Entrant { way, budget: Budget::Samples(samples) };
+    let numbers = [4, 16].into_iter().flat_map(|samples| ways.map(entrant(samples)));
+    let to_error = Entrant { way: ways[1], budget: Budget::Error(0.3) };
+    let entrants = numbers.chain([to_error]).collect();
+    TradeOptions { entrants, seeds: 2, reference_samples: 256, grey: None, most: 1024, lights: 200 }
 }
 
 fn settings() -> RenderSettings {
@@ -81,9 +83,9 @@ fn a_run_that_is_stopped_goes_on_where_it_was() {
     assert_eq!(before.len(), 4);
     let onlooker = patience(usize::MAX);
     let (_, rows) = measure(&stage, &set, folder.path(), &onlooker).unwrap();
-    assert_eq!(rows.len(), 4);
+    assert_eq!(rows.len(), 5);
     let after = kept();
-    assert_eq!(after.len(), 2 + 8);
+    assert_eq!(after.len(), 2 + 10);
     assert!(before.iter().all(|file| after.contains(file)), "what was there is as it was");
     // A third run renders nothing: times would differ.
     let again = measure(&stage, &set, folder.path(), &patience(usize::MAX)).unwrap().1;
@@ -103,7 +105,7 @@ fn errors_do_not_depend_on_threads_or_runs() {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         let measured = pool.install(|| measure(&stage, &set, folder.path(), &patience(usize::MAX)));
         let (converged, rows) = measured.unwrap();
-        let rows: Vec<_> = rows.iter().map(|row| (row.errors, row.mean_off, row.lights)).collect();
+        let rows: Vec<_> = rows.iter().map(|row| (row.errors, row.samples, row.lights)).collect();
         (converged.reference, rows)
     };
     assert_eq!(errors(1), errors(3));
@@ -118,6 +120,10 @@ fn importance_beats_blind_picking_and_more_samples_beat_fewer() {
     assert!(error("tree:0@4") < 0.7 * error("uniform@4"));
     assert!(error("tree:0@16") < 0.7 * error("tree:0@4"));
     assert!(converged.error < 0.5 * error("tree:0@16"));
+    // The error that was asked for is there, and what it took is told.
+    let asked = rows.iter().find(|row| row.asked == Some(0.3)).unwrap();
+    assert!(asked.name == "tree:0@0.3" && asked.error < 1.1 * 0.3, "{asked:?}");
+    assert!((8..1024).contains(&asked.samples) && asked.mean_off.abs() < 0.02, "{asked:?}");
     let through_tree = rows.iter().filter(|row| row.entrant.way.strategy == LightStrategy::Tree);
     assert!(through_tree.clone().all(|row| row.mean_off.abs() < 0.02), "{rows:#?}");
     let terms = Terms {

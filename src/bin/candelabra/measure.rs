@@ -8,8 +8,8 @@ use crate::{page, pilot};
 use anyhow::{Context, Result, bail};
 use candelabra::light_tree::learned::LearnedFile;
 use candelabra::measure::{
-    self, Asked, Cache, Converged, Entrant, Machine, Onlooker, ProbeOptions, Report, ShotCost,
-    Subject, Terms, Trade, TradeError, TradeOptions, Way, at_probes,
+    self, Asked, Budget, Cache, Converged, Entrant, Machine, Onlooker, ProbeOptions, Report,
+    ShotCost, Subject, Terms, Trade, TradeError, TradeOptions, Way, at_probes,
 };
 use candelabra::pipeline::{
     Effort, Event, Stamper, Watch, caveat, open_learned, option, view_keys,
@@ -31,8 +31,9 @@ use std::process::ExitCode;
 pub struct Arguments {
     #[command(flatten)]
     pub scene: crate::shot::Arguments,
-    /// What to measure: STRATEGY[:SPLIT[:TEST]][@SAMPLES], such as tree, tree:0.3@16,
-    /// tree:0.3:solid-angle@4, all@2. Without samples at every budget. If nothing is named: uniform, power,
+    /// What to measure: STRATEGY[:SPLIT[:TEST]][@SAMPLES or @ERROR], such as tree, tree:0.3@16,
+    /// tree:0.3:solid-angle@4, all@2. tree@0.05 gets its samples where the error is, until that is 0.05, as by
+    /// candelabra-render --error. Without either at every budget. If nothing is named: uniform, power,
     /// distance:0, tree:0 and tree, and where there are few lights exhaustive and all
     ways: Vec<Asked>,
     /// Samples of each pixel to try
@@ -65,7 +66,7 @@ pub struct Arguments {
     /// Pictures by each, with different seeds
     #[arg(long, default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..=1 << 16))]
     seeds: u32,
-    /// Samples of the picture that all are compared with; 16 times the largest budget if not given
+    /// Samples of the picture that all are compared with; 16 times the largest number of samples if not given
     #[arg(long, value_name = "SAMPLES", value_parser = clap::value_parser!(u32).range(2..=1 << 24))]
     reference_spp: Option<u32>,
     /// The luminance below which error is absolute; a tenth of the picture's middle if not given
@@ -254,12 +255,18 @@ fn measure(arguments: &Arguments, display: &Display) -> Result<Measured> {
     let base = RenderSettings { split: Split::ByBounce(knobs), ..base };
     report.settings = base.clone();
     let entrants = entrants(arguments, report.lights);
-    let most = entrants.iter().map(|entrant| entrant.samples).max().unwrap_or(1);
+    let budgets = entrants.iter().map(|entrant| entrant.budget);
+    let numbers = budgets.clone().filter_map(Budget::samples);
+    // An error takes as many samples as it takes.
+    let is_open = budgets.clone().any(|budget| budget.error().is_some());
+    let others = arguments.budgets.iter().copied().filter(|_| is_open);
+    let most = numbers.chain(others).max().unwrap_or(1);
     let options = TradeOptions {
         entrants,
         seeds: arguments.seeds,
         reference_samples: arguments.reference_spp.unwrap_or(16 * most).next_multiple_of(2),
         grey: arguments.grey,
+        most: Effort::MOST,
         lights: report.lights,
     };
     let rest = format!("{} {:?}", options.reference_samples, options.grey);
@@ -289,7 +296,8 @@ fn measure(arguments: &Arguments, display: &Display) -> Result<Measured> {
     if arguments.html.is_some() {
         display.tell(Event::Stage { name: "pictures for the page".into() });
         for entrant in trade.at_equal_times() {
-            pictures.push((entrant, measure::again(&mut subject, &entrant, &teller)?));
+            let goal = (converged.grey, options.most);
+            pictures.push((entrant, measure::again(&mut subject, &entrant, goal, &teller)?));
         }
     }
     report.trade = Some(trade);
@@ -320,20 +328,21 @@ fn exact_ways(arguments: &Arguments) -> Vec<Way> {
 
 /// Everything that takes part, the smallest budgets first.
 fn entrants(arguments: &Arguments, lights: usize) -> Vec<Entrant> {
-    let all = || Way::usual(lights).into_iter().map(|way| Asked { way, samples: None });
+    let all = || Way::usual(lights).into_iter().map(|way| Asked { way, budget: None });
     let asked: Vec<Asked> =
         if arguments.ways.is_empty() { all().collect() } else { arguments.ways.clone() };
     let mut entrants: Vec<Entrant> = Vec::new();
-    for Asked { way, samples } in asked {
-        let budgets = samples.map_or(arguments.budgets.clone(), |samples| vec![samples]);
-        for samples in budgets {
-            let entrant = Entrant { way, samples };
+    let usual = || arguments.budgets.iter().copied().map(Budget::Samples).collect();
+    for Asked { way, budget } in asked {
+        let budgets: Vec<Budget> = budget.map_or_else(usual, |budget| vec![budget]);
+        for budget in budgets {
+            let entrant = Entrant { way, budget };
             if !entrants.contains(&entrant) {
                 entrants.push(entrant);
             }
         }
     }
-    entrants.sort_by_key(|entrant| entrant.samples);
+    entrants.sort_by(|a, b| a.budget.by_work(&b.budget));
     entrants
 }
 

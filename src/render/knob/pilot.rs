@@ -31,13 +31,16 @@ const PLAIN: u32 = 8;
 const LEAST_PIXELS: u64 = 24;
 /// No pixel is more than this share of the noise: one bright sample would decide alone.
 const LARGEST_SHARE: f64 = 0.125;
+/// Standard errors of a mean. If noise is rare the mean is above it more often than in a normal distribution: one time in six
+/// where one pixel in fifty has all of it and 160 are looked at.
+const SURE: f64 = 2.0;
 /// The random numbers are not those of any frame.
 const SEED: u32 = 0x6b6e_6f62;
 /// The first of [`KNOBS`] that are tried only if the one before turns out to be the best: they cost most.
 const FIRST_COSTLY: usize = 6;
 
 /// The knobs for a shot with the delegate's settings, by a frame of it. Without [`Split::Auto`] they are
-/// those that the settings tell. If an `error` is asked for, a frame has as many samples as that is going to take,
+/// those that the settings tell. If an `error` is asked for, a frame has as many samples as that may take,
 /// at most those of the settings. A picture of few paths gets the usual knobs, because to find out more
 /// would cost more than it gains.
 ///
@@ -113,17 +116,42 @@ impl Plain {
         self.0.iter().map(|halves| halves.squared_error(grey)).collect()
     }
 
-    /// How many samples a pixel takes in the mean, to an error and at most those of the settings, as far as a few
-    /// pixels can tell. Pixels without noise do not count for the error of a frame.
+    /// How many samples a pixel takes in the mean, to an error and at most those of the settings. Where few pixels hold
+    /// most of the noise, few pixels of a pilot tell little of it, and a frame takes more samples to be sure. So
+    /// this is the upper end of what the pixels tell; and if by that the pilot takes more pixels, those are asked, too.
     fn samples_for(&mut self, integrator: &Integrator, error: f64) -> u32 {
-        let RenderSettings { width, height, samples: most, .. } = *integrator.settings;
-        let few = u64::from(width) * u64::from(height) / u64::from(2 * PATHS);
-        let few = few.clamp(LEAST_PIXELS, LEAST_PIXELS * u64::from(PLAIN));
-        let errors = self.squared_errors(integrator, few as u32);
-        let noisy: Vec<f64> = errors.into_iter().filter(|&own| own > 0.0).collect();
-        let of_one = f64::from(2 * PATHS) * noisy.iter().sum::<f64>() / noisy.len().max(1) as f64;
-        (of_one / (error * error)).clamp(1.0, f64::from(most)) as u32
+        let settings = integrator.settings;
+        let frame = u64::from(settings.width) * u64::from(settings.height);
+        let first = LEAST_PIXELS..=LEAST_PIXELS * u64::from(PLAIN);
+        let mut pixels = (frame / u64::from(2 * PATHS)).clamp(*first.start(), *first.end());
+        loop {
+            let errors = self.squared_errors(integrator, pixels as u32);
+            let samples = (f64::from(2 * PATHS) * surely_below(&errors, frame as f64)
+                / (error * error))
+                .clamp(1.0, f64::from(settings.samples)) as u32;
+            let wanted = u64::from(PLAIN) * pixels_for(settings, samples).unwrap_or(0);
+            if wanted <= pixels {
+                return samples;
+            }
+            pixels = wanted.min(2 * pixels);
+        }
     }
+}
+
+/// The mean squared error that a frame of so many pixels proves to be below, by the squared errors of some of them.
+/// Pixels without noise do not count. The first factor is what the few pixels may have missed, the second what the
+/// frame takes to be sure of its own mean.
+fn surely_below(errors: &[f64], frame: f64) -> f64 {
+    let noisy: Vec<f64> = errors.iter().copied().filter(|&own| own > 0.0).collect();
+    let count = noisy.len().max(1) as f64;
+    let mean = noisy.iter().sum::<f64>() / count;
+    if mean == 0.0 {
+        return 0.0;
+    }
+    let spread = noisy.iter().map(|own| (own / mean - 1.0).powi(2)).sum::<f64>() / count;
+    let noisy_of_frame = frame * count / errors.len() as f64;
+    let margin = |pixels: f64| 1.0 + SURE * (spread / pixels).sqrt();
+    mean * margin(count) * margin(noisy_of_frame)
 }
 
 /// What the paths through one pixel showed.
@@ -220,4 +248,39 @@ fn pixel(integrator: &Integrator, number: u32, tried: &[Range<usize>; Knobs::KIN
     }
     let spent = scratch.trial.map(|trial| trial.spent).unwrap_or_default();
     Pixel { halves, picking, spent, own: scratch.stats }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn even_noise_has_no_margin_and_sky_does_not_count() {
+        let mut errors = vec![0.04; 100];
+        assert!((surely_below(&errors, 1e4) / 0.04 - 1.0).abs() < 1e-12);
+        errors.resize(400, 0.0);
+        assert!((surely_below(&errors, 1e4) / 0.04 - 1.0).abs() < 1e-12);
+        assert_eq!(surely_below(&[0.0; 9], 1e4), 0.0);
+    }
+
+    /// Where one pixel in fifty holds nearly all noise, a few pixels have mostly seen too little of it.
+    #[test]
+    fn a_frame_seldom_has_more_noise_than_its_pilot_expects() {
+        const DRAWS: u32 = 1000;
+        const MEAN: f64 = 0.02 + 0.98 * 1e-3;
+        let error = |number: u32| if hash(SEED, number) % 50 == 0 { 1.0 } else { 1e-3 };
+        let pixels = |draw: u32| (160 * draw..160 * (draw + 1)).map(error).collect::<Vec<f64>>();
+        let (mut naive, mut short) = (0, 0);
+        for draw in 0..DRAWS {
+            let errors = pixels(draw);
+            naive += u32::from(errors.iter().sum::<f64>() / 160.0 < MEAN);
+            short += u32::from(surely_below(&errors, 1e9) < MEAN);
+        }
+        assert!(naive > DRAWS / 2, "the mean alone is too small {naive} times");
+        assert!(short < DRAWS / 5, "too small {short} times");
+        // A small frame has to prove more.
+        let mut errors = vec![1e-3; 160];
+        errors[0] = 1.0;
+        assert!(surely_below(&errors, 400.0) > 1.5 * surely_below(&errors, 1e9));
+    }
 }
