@@ -36,7 +36,7 @@ use super::document::{label, morph_targets};
 use super::geometry::Vertices;
 use super::{Output, Source};
 use crate::ingest::error::Fault;
-use crate::scene::{Category, Channel, Deformation, Mesh, Shape};
+use crate::scene::{Category, Channel, Deformation, Keys, Mesh, Shape};
 use glam::{Vec3, Vec4};
 use gltf::json::mesh::{Primitive, Semantic};
 use gltf::json::validation::Checked;
@@ -176,7 +176,14 @@ impl Poses {
         let animated = pose.animated.filter(|_| !targets.is_empty());
         let deforms = animated.is_some() || hung.is_some_and(|hung| hung.deforms);
         let weights = match animated {
-            Some(node) => self.weights[&node].keys.clone(),
+            Some(node) => {
+                let keys = &self.weights[&node].keys;
+                let bytes =
+                    |keys: &Keys<_>| size_of_val(&*keys.times_s) + size_of_val(&*keys.values);
+                let bytes: usize = keys.iter().map(bytes).sum();
+                output.budget.take(bytes as u64, || object.to_string())?;
+                keys.clone()
+            }
             None => weights::constant(&weights),
         };
         let skin = bound.map(|bound| bound.skin);

@@ -109,15 +109,16 @@ impl Rig {
         self.path(node, against).any(|node| !self.nodes[&node].node.channels.is_empty())
     }
 
-    /// The joints of a skin as they are below a node, or in the world. A joint that is not in the scene or not below
-    /// that node moves nothing.
+    /// The joints of a skin as they are below a node, or in the world, and how many bytes that takes anew. A joint that
+    /// is not in the scene or not below that node moves nothing.
     pub(super) fn skeleton(
         &self,
         (skin, below): Place,
         joints: &[usize],
         inverse_bind: impl Fn(usize) -> DAffine3,
-    ) -> Arc<Skeleton> {
+    ) -> (Arc<Skeleton>, u64) {
         let mut skeletons = self.skeletons.borrow_mut();
+        let mut bytes = 0;
         let skeleton = skeletons.entry((skin, below)).or_insert_with(|| {
             let (mut nodes, mut numbers) = (Vec::new(), HashMap::new());
             let joint = |(number, &joint): (usize, &usize)| {
@@ -136,7 +137,10 @@ impl Rig {
                         let parent = self.nodes[&row].parent;
                         let parent = parent.and_then(|parent| numbers.get(&parent).copied());
                         numbers.insert(row, nodes.len() as u32);
-                        nodes.push(Node { parent, ..self.nodes[&row].node.clone() });
+                        let node = &self.nodes[&row].node;
+                        let keys: u64 = node.channels.iter().map(byte_length).sum();
+                        bytes += keys + size_of::<Node>() as u64;
+                        nodes.push(Node { parent, ..node.clone() });
                     }
                 }
                 Some((numbers[&joint], inverse_bind(number)))
@@ -144,7 +148,7 @@ impl Rig {
             let joints = joints.iter().enumerate().map(joint).collect();
             Arc::new(Skeleton { nodes, joints })
         });
-        skeleton.clone()
+        (skeleton.clone(), bytes)
     }
 }
 

@@ -24,6 +24,8 @@ pub(super) struct Bound {
     pub skin: Skin,
     /// Whether there are vertices without weights.
     has_free: bool,
+    /// What its skeleton takes anew.
+    bytes: u64,
 }
 
 /// Moves a mesh by the joints of a skin; else says what is wrong with that, and leaves the mesh as it was.
@@ -47,6 +49,8 @@ pub(super) fn apply(
     let bytes = ((VERTEX_BYTES + 2 * of_influences) * mesh.positions.len()) as u64;
     output.budget.take(bytes, || object.to_string())?;
     let bound = bind(source, (rig, skin, row), arrays, mesh);
+    let of_skeleton = bound.as_ref().map_or(0, |bound| bound.bytes);
+    output.budget.take(of_skeleton, || object.to_string())?;
     let bound = bound.and_then(|bound| bend(mesh, &bound.skin, output).map(|()| bound));
     if !bound.as_ref().is_ok_and(|bound| bound.hung.deforms) {
         output.budget.put_back(bytes);
@@ -97,8 +101,8 @@ fn bind(
         return Err("its skin has joints that are not in the scene".into());
     }
     let hung = hang(rig, &nodes, &moving);
-    let skeleton = rig.skeleton((number, hung.below), &nodes, inverse_bind);
-    Ok(Bound { hung, skin: Skin { skeleton, ends, influences }, has_free })
+    let (skeleton, bytes) = rig.skeleton((number, hung.below), &nodes, inverse_bind);
+    Ok(Bound { hung, skin: Skin { skeleton, ends, influences }, has_free, bytes })
 }
 
 /// Moves each vertex that joints move, as at the first frame; else says that one goes too far, and moves none.
