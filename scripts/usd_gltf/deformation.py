@@ -3,7 +3,7 @@
 A glTF mesh has the shape of the first frame, and a target for each further key: what is to be added to points and
 normals. At its key a target's weight is 1 and all others are 0, so that shapes between keys are linear
 in time, as UsdGeom's points are between samples. Keys are those sampled times that linear interpolation of the
-others does not show. Equal shapes have one target, that of the first frame has none.
+others does not show; with too many bytes, not nearly. Equal shapes have one target, that of the first frame none.
 
 Shapes are read one time after another. Held are some eight of them, 24 bytes a vertex each, and the targets.
 """
@@ -27,8 +27,9 @@ MOST_BYTES = 1 << 30
 MOST_BYTES_OF_A_STAGE = 2 << 30
 """The same of all meshes of a stage: a .glb holds 4 GiB."""
 
-_NORMALS = 1e-3
-"""How far the normals shown by a key that is left out may be away, in radians."""
+_NEAR = ((NOISE, 1e-3), (10 * NOISE, 3e-3), (100 * NOISE, 1e-2))
+"""How far off the shape may be where a key is left out: points, relative to the largest coordinate, and normals, in
+radians. The first is what single precision tells apart; the others are for meshes of too many bytes."""
 
 
 @dataclass
@@ -40,6 +41,8 @@ class Motion:
     """(keys, targets)"""
     names: list[str]
     """Of each target, the time code that it shows."""
+    near: float
+    """How far off points may be between keys, relative to the largest coordinate."""
     sampler: int | None = None
 
     def animate(self, document: Document, node: int) -> None:
@@ -80,15 +83,24 @@ class Deformer:
         `shape(code)` are the rows, points (3) and normals (3) if there are any, of the vertices of all parts in
         order, float32. Raises TooMuch, and what `shape` raises.
         """
+        for near in _NEAR:
+            try:
+                return self._carry(parts, shape, *near)
+            except TooMuch as error:
+                why = error
+        raise why
+
+    def _carry(
+        self, parts: list[Part], shape: Callable[[float], np.ndarray], points: float, normals: float
+    ) -> Motion | None:
+        """The same with keys left out where that is so far off."""
         frames = self.frames
         base = shape(frames.first)
-        near = np.full(base.shape[1], _NORMALS, np.float32)
-        near[:3] = NOISE * np.abs(base[:, :3]).max(initial=0.0)
+        near = np.full(base.shape[1], normals, np.float32)
+        near[:3] = points * np.abs(base[:, :3]).max(initial=0.0)
         moved = ((code, shape(code) - base if code != frames.first else np.zeros_like(base)) for code in frames.codes)
         most = min(MOST_BYTES, MOST_BYTES_OF_A_STAGE - self._bytes)
-        codes: list[float] = []
-        shown: list[int] = []
-        names: list[str] = []
+        codes, shown, names = [], [], []
         targets: list[np.ndarray | None] = []
         known: dict[bytes, int] = {}
         for code, by in needed_shapes(moved, near, frames.first):
@@ -118,7 +130,7 @@ class Deformer:
         self._write(parts, targets)
         self.report.count("deforming meshes")
         self.report.count("morph targets", len(targets))
-        return Motion(frames.seconds_at(codes), weights, names)
+        return Motion(frames.seconds_at(codes), weights, names, points)
 
     def _write(self, parts: list[Part], targets: list[np.ndarray | None]) -> None:
         for number, by in enumerate(targets):

@@ -21,6 +21,7 @@ import numpy as np
 from pxr import Usd, UsdGeom, UsdShade
 
 from . import gprims
+from .animation import NOISE
 from .deformation import Deformer, Motion, Part, TooMuch
 from .gltf_document import Document
 from .light_inputs import Light
@@ -270,7 +271,11 @@ class MeshReader:
             return np.hstack(rows).astype(np.float32)
 
         try:
-            return self.deformer.carry(parts, shape)
+            motion = self.deformer.carry(parts, shape)
+            if motion is not None and motion.near > NOISE:
+                why = f"all keys are too many bytes; those that are kept show its points to {motion.near:g} of its largest coordinate"
+                self.report.about("animation").warn(mesh.prim.GetPath(), "deformation with fewer keys", why)
+            return motion
         except (Unlike, TooMuch) as why:
             self.polygons.lose(mesh.prim, polygons, why)
             return None

@@ -22,7 +22,7 @@ from .primvars import CornerValues, as_rows
 from .report import Notebook
 from .stage import Frames, changes
 from .subdivision_masks import limit, refine, refine_linear
-from .subdivision_normals import limit_normals
+from .subdivision_normals import LimitNormals
 from .subdivision_seams import torn
 from .subdivision_topology import INFINITE, Topology, boundaries, build, crease, sharpen_vertices, split_to_quads, split_to_triangles
 from .triangulate import triangulate
@@ -94,9 +94,13 @@ class Surface:
         points, last = self._refine(self._levels, points, self._linear), self._levels[-1]
         if self._linear:
             return points, None
-        normals, index = limit_normals(last, points, self._triangular)
-        facing = CornerValues(-normals if self._rules.left_handed else normals, index, exact=True)
+        normals = self._facing(points)
+        facing = CornerValues(-normals if self._rules.left_handed else normals, self._facing.index, exact=True)
         return limit(last, points, self._triangular), facing
+
+    @cached_property
+    def _facing(self) -> LimitNormals:
+        return LimitNormals(self._levels[-1], self._triangular)
 
     @cached_property
     def triangles(self) -> tuple[np.ndarray, np.ndarray]:

@@ -332,9 +332,26 @@ def test_too_many_bytes_keep_the_first_frame(export, monkeypatch):
     assert len(scene.primitives("/N")[0]["targets"]) == 1
     monkeypatch.setattr(deformation, "MOST_BYTES", 1 << 30)
     monkeypatch.setattr(deformation, "MOST_BYTES_OF_A_STAGE", 300)
-    result = export(text)
+    result = export(text, out="again.glb")
     assert [w["path"] for w in result.report["warnings"] if w["what"] == "animated points"] == ["/M"]
     assert len(Gltf(result.path).primitives("/N")[0]["targets"]) == 1
+
+
+def test_keys_are_fewer_where_all_are_too_many_bytes(export, monkeypatch):
+    angles = {code: code / 50 for code in range(1, 33)}
+    text = SHOT.replace("= 5", "= 32") + cube(
+        {code: CORNERS + [[0, 3e-3 * np.sin(angle * np.pi), 0]] for code, angle in angles.items()}
+    )
+    full = Gltf(export(text, "--strict").path)
+    assert len(full.primitives("/M")[0]["targets"]) > 20
+    monkeypatch.setattr(deformation, "MOST_BYTES", 2000)
+    result = export(text, out="fewer.glb")
+    assert result.warned("animation") == {"deformation with fewer keys"}
+    scene = Gltf(result.path)
+    targets = scene.primitives("/M")[0]["targets"]
+    assert 1 < len(targets) * 8 * 12 < 2000
+    for code in angles:
+        assert scene.deformed("/M", seconds(code)) == pytest.approx(full.deformed("/M", seconds(code)), abs=1.1e-4)
 
 
 def test_points_that_only_wander_where_no_face_is_change_no_byte(export):
