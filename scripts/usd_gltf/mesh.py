@@ -206,6 +206,7 @@ class MeshReader:
             if normals and surface.normals:
                 why = "UsdGeom gives them no meaning; a mesh of polygons has subdivisionScheme = none"
                 self.report.note(prim.GetPath(), "authored normals of a subdivision surface are not used", why)
+                polygons.normals = None
             normals = surface.normals or (normals and surface.carry(normals))
         with np.errstate(invalid="ignore", over="ignore"):  # the faces of such points go below
             triangles, faces = triangulate(points, counts, corners) if surface is None else surface.triangles

@@ -78,7 +78,7 @@ class PolygonReader:
         return changes(prim.GetAttribute("points"), self.frames) or self.skinning.may_deform(prim)
 
     def at(self, prim: Usd.Prim, code: float, first: Polygons) -> tuple[np.ndarray, CornerValues | None]:
-        """Points (v, 3) and normals of a mesh that deforms, at another time. Raises Unlike."""
+        """Points (v, 3) of a mesh that deforms, and normals if `first` has any, at another time. Raises Unlike."""
         normals = self._like(prim, code, first) if first.normals is not None else None
         points, normals = self._posed(prim, code, first, normals)
         good = np.abs(points) < 3e38
@@ -114,9 +114,11 @@ class PolygonReader:
         if not any(what.startswith("animated") for what in found.changed) and not self.skinning.differs(prim, code):
             return False
         points, _ = self._posed(prim, code, found, None)
-        used = np.unique(found.corners)
-        near = NOISE * np.nanmax(np.abs(found.points[used]), initial=0.0)
-        with np.errstate(invalid="ignore"):
+        used = np.zeros(len(points), bool)
+        used[found.corners] = True
+        size = np.abs(found.points[used])
+        with np.errstate(invalid="ignore", over="ignore"):
+            near = NOISE * size[size < 3e38].max(initial=0.0)
             return bool((np.abs(points[used] - found.points[used]) > near).any())
 
     def _posed(self, prim: Usd.Prim, code: float, first: Polygons, normals: CornerValues | None):

@@ -135,15 +135,18 @@ class Skinning:
 
     def may_deform(self, prim: Usd.Prim) -> bool:
         """Whether a skeleton deforms the mesh, and its pose changes."""
-        return any(self.differs(prim, code) for code in self.frames.codes)
+        return self._deforming(prim) is not None and any(self.differs(prim, code) for code in self.frames.codes)
 
     def differs(self, prim: Usd.Prim, code: float) -> bool:
-        """Whether what decides the pose of a mesh is other than at the first frame, by more than rounding. Joints
-        that move may still be none that it follows."""
+        """Whether what decides the pose of a mesh is other than at the first frame, by more than rounding, or cannot be
+        told. Joints that move may still be none that it follows."""
         binding = self._deforming(prim)
         if binding is None or code == self.frames.first:
             return False
-        first, now = binding.state(self.frames.first), binding.state(code)
+        try:
+            first, now = binding.state(self.frames.first), binding.state(code)
+        except (ValueError, np.linalg.LinAlgError):
+            return True
         return not all(
             a.shape == b.shape and np.allclose(a, b, rtol=1e-6, atol=1e-6) for a, b in zip(first, now, strict=True)
         )

@@ -377,6 +377,21 @@ def test_points_that_are_no_numbers_later_stay(export):
     assert found[~stays] == pytest.approx(base[~stays] * [1, 0.25, 1.5] + [0, 0.5, 0], abs=1e-6)
 
 
+def test_a_pose_that_is_no_number_is_that_of_the_first_frame(export):
+    text = figure(mesh(SKIN), NOD).replace(
+        "double3 xformOp:translate = (0, 0, 3)", "double3 xformOp:translate.timeSamples = { 1: (0, 0, 3), 2: (0, 0, 3), 3: (nan, 0, 3), 4: (0, 0, 3) }"
+    )
+    result = export(text, "--frames", "1-5")
+    assert result.code == 0, result.err
+    assert "points that are not finite over time" in result.warned("geometry")
+    scene = Gltf(result.path)
+    assert scene.deformed("/Figure/M", seconds(3)) == pytest.approx(scene.attribute("/Figure/M", "POSITION"))
+    world = scene.world("/Figure/M")[:3, 3]
+    wanted, _ = baked(figure(mesh(SKIN), NOD), "/Figure/M", 5)
+    far = np.linalg.norm(wanted[:, None] - (scene.deformed("/Figure/M", seconds(5)) + world), axis=2)
+    assert max(far.min(axis=0).max(), far.min(axis=1).max()) < 2e-5
+
+
 def test_equal_runs_are_equal_bytes(export):
     text = figure(SHAPES, NOD, WEIGHTS)
     first = export(text, "--frames", "1-5").path.read_bytes()
