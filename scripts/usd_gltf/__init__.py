@@ -19,8 +19,9 @@ A tour, in the order of the work:
 `light_profiles`    the IES profiles of lights
 `light_textures`    the pictures of rect lights and domes
 `pictures`, `baking`, `asset_files`     picture files into arrays, light of any range into a PNG
-`mesh`, `triangulate`, `primvars`, `gprims`     geometry
+`mesh`, `polygons`, `normals`, `triangulate`, `primvars`, `gprims`     geometry
 `skinning`          poses of skeletons and blend shapes
+`deformation`       morph targets of what changes its shape
 `subdivision`, `subdivision_topology`, `subdivision_masks`, `subdivision_normals`, `subdivision_seams`   smooth surfaces
 `materials`, `surfaces`, `look_builder`, `textures`     looks: which surface is read, and how glTF says it
 `preview_surface`   UsdPreviewSurface

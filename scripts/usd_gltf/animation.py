@@ -15,7 +15,7 @@ from .stage import Frames
 from .transforms import continuous, slerp
 
 _WIDTHS = {"translation": 3, "rotation": 4, "scale": 3}
-_NOISE = 1e-6
+NOISE = 1e-6
 """Single precision's, relative to the values that it is about."""
 _NOTHING = 1e-12
 """The same where these are 0."""
@@ -23,7 +23,7 @@ _NOTHING = 1e-12
 
 def varies(values: np.ndarray) -> bool:
     """Whether rows of `values` differ by more than single precision's noise."""
-    return len(values) > 1 and not np.allclose(values, values[0], rtol=_NOISE, atol=1e-9)
+    return len(values) > 1 and not np.allclose(values, values[0], rtol=NOISE, atol=1e-9)
 
 
 def needed(frames: Frames, values: np.ndarray, turns: bool = False) -> np.ndarray:
@@ -45,7 +45,7 @@ def needed(frames: Frames, values: np.ndarray, turns: bool = False) -> np.ndarra
     else:
         shown = values[before] + share * (values[after] - values[before])
     size = np.abs(values).max(axis=1)
-    noise = _NOISE * np.maximum(size[before], size[after]) + _NOTHING
+    noise = NOISE * np.maximum(size[before], size[after]) + _NOTHING
     kept |= np.isin(span, span[np.abs(shown - values).max(axis=1) > noise])
     # What comes before the first frame and after the last is held there.
     for end, inner in ((0, at[1]), (-1, at[-2])):

@@ -197,25 +197,25 @@ class Document:
 
     def write(self, usd: dict) -> None:
         """Write all files, the glTF itself last. `usd` becomes `asset.extras.usd`."""
-        body = b"".join(self._chunks)
-        files = {self.output.parent / uri: data for uri, data in self.side_files.items()}
+        # Its parts are not joined: a copy of gigabytes.
+        files = {self.output.parent / uri: [data] for uri, data in self.side_files.items()}
         if self.binary:
             header = self._json(usd, None)
             header += b" " * (-len(header) % 4)
-            chunks = struct.pack("<II", len(header), 0x4E4F534A) + header
-            if body:
-                chunks += struct.pack("<II", len(body), 0x004E4942) + body
-            length = 12 + len(chunks)
+            main = [struct.pack("<II", len(header), 0x4E4F534A), header]
+            if self._length:
+                main += [struct.pack("<II", self._length, 0x004E4942), *self._chunks]
+            length = 12 + sum(map(len, main))
             if length >= 1 << 32:
                 raise ExportError(
                     f"{self.output}: {length} bytes do not fit a .glb (4 GiB): write a .gltf"
                 )
-            main = struct.pack("<4sII", b"glTF", 2, length) + chunks
+            main.insert(0, struct.pack("<4sII", b"glTF", 2, length))
         else:
             name = re.sub(r"[^A-Za-z0-9._-]+", "_", self.output.stem) + ".bin"
-            main = self._json(usd, name)
-            if body:
-                files[self.output.parent / name] = body
-        for path, data in sorted(files.items()):
-            write_atomically(path, data)
-        write_atomically(self.output, main)
+            main = [self._json(usd, name)]
+            if self._length:
+                files[self.output.parent / name] = self._chunks
+        for path, parts in sorted(files.items()):
+            write_atomically(path, *parts)
+        write_atomically(self.output, *main)

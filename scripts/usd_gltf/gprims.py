@@ -16,6 +16,9 @@ RINGS = 16
 
 TYPES = ("Cube", "Sphere", "Cylinder", "Cylinder_1", "Cone", "Capsule", "Capsule_1", "Plane")
 
+SIZES = ("size", "width", "length", "radius", "height", "radiusBottom", "radiusTop")
+"""The attributes that shape them; of each type its own."""
+
 
 @dataclass
 class Polygons:

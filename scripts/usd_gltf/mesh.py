@@ -4,6 +4,9 @@ A mesh is cut into pieces, one for each material (GeomSubset). Corners with equa
 texture coordinates and colour share a vertex. Texture coordinates are turned over: USD's v runs up
 from the image's last row, glTF's down from its first.
 
+A mesh that deforms has morph targets (`deformation`). What emits light keeps the shape of the first frame: its
+triangles are lights of the tree.
+
 A subdivision surface is refined (`subdivision`); at complexity low its cage is exported, with smooth normals
 (weighted by area) if it has none of its own, and reported. A polygon mesh without normals has none in glTF
 either: flat shading.
@@ -18,13 +21,17 @@ import numpy as np
 from pxr import Usd, UsdGeom, UsdShade
 
 from . import gprims
+from .animation import NOISE
+from .deformation import Deformer, Motion, Part, TooMuch
 from .gltf_document import Document
 from .light_inputs import Light
 from .materials import Emission, Look, Materials
-from .primvars import CornerValues, as_rows, read_normals, read_primvar
+from .normals import refined, smooth_normals, unit_normals
+from .polygons import PolygonReader, Polygons, Unlike
+from .primvars import CornerValues, as_rows, read_primvar
 from .report import Notebook
 from .skinning import Skinning
-from .stage import Frames, changes
+from .stage import Frames
 from .subdivision import Subdivider, Surface
 from .triangulate import triangulate
 
@@ -76,6 +83,8 @@ class MeshSource:
     pieces: list[Piece]
     points: np.ndarray
     triangles: np.ndarray
+    motion: Motion | None = None
+    """How it deforms: over the targets of its pieces' primitives."""
 
     def area(self, linear: np.ndarray) -> float:
         """World-space surface area (one side) under the linear part of a transform."""
@@ -144,14 +153,16 @@ class MeshReader:
         report: Notebook,
     ) -> None:
         self.document, self.materials, self.skinning = document, materials, skinning
-        self.frames, self.code, self.report = frames, frames.first, report
+        self.code, self.report = frames.first, report
+        self.polygons = PolygonReader(skinning, frames, report)
+        self.deformer = Deformer(document, frames, report)
         self.subdivider = Subdivider(complexity, frames, report)
         self._read: dict[tuple, MeshSource | None] = {}
         self.link_subsets: LinkSubsets | None = None
         """Subsets that light links divide meshes by, besides materials."""
 
-    def read(self, prim: Usd.Prim) -> MeshSource | None:
-        """The mesh of a Mesh or an intrinsic gprim; None (reported) if it has no faces."""
+    def read(self, prim: Usd.Prim, is_light: bool) -> MeshSource | None:
+        """The mesh of a Mesh or an intrinsic gprim, which may be a light; None (reported) if it has no faces."""
         subsets = _material_subsets(prim)
         if self.link_subsets is not None:
             subsets += self.link_subsets.of(prim, subsets)
@@ -160,9 +171,10 @@ class MeshReader:
         source = prim.GetPrimInPrototype() if prim.IsInstanceProxy() else prim
         names = tuple(subset.GetName() for subset in subsets)
         looks = tuple(look.path for look in bound)
-        key = (source.GetPath(), looks, color, names, self.skinning.name(prim))
+        emits = is_light or any(look.emits for look in bound)
+        key = (source.GetPath(), looks, color, names, self.skinning.name(prim), emits and self.polygons.may_deform(prim))
         if key not in self._read:
-            self._read[key] = self._build(prim, subsets, bound)
+            self._read[key] = self._build(prim, subsets, bound, emits)
         return self._read[key]
 
     @staticmethod
@@ -175,23 +187,26 @@ class MeshReader:
         found = [api.FindPrimvarWithInheritance(name) for name in names]
         return " ".join(str(p.Get()) for p in found if p and p.GetAttr().GetPrim() != prim)
 
-    def _build(self, prim: Usd.Prim, subsets: list[UsdGeom.Subset], bound: list[Look]) -> MeshSource | None:
-        polygons = self._polygons(prim)
+    def _build(
+        self, prim: Usd.Prim, subsets: list[UsdGeom.Subset], bound: list[Look], emits: bool
+    ) -> MeshSource | None:
+        polygons = self.polygons.first(prim, emits)
         if polygons is None:
             return None
-        points, counts, corners, normals = polygons
-        points = np.where(np.abs(points) < 3e38, points, np.nan)
+        points, counts, corners, normals = polygons.points, polygons.counts, polygons.corners, polygons.normals
+        points = polygons.points = np.where(np.abs(points) < 3e38, points, np.nan)
         if not np.isfinite(points).all():
             self.report.warn(prim.GetPath(), "points that are not finite", "faces that use them are left out")
         authored, surface = Authored(prim, counts, corners), None
         if prim.GetTypeName() not in gprims.TYPES:
-            surface = authored.surface = self.subdivider.surface(prim, points, counts, corners)
+            surface = authored.surface = self.subdivider.surface(prim, points, counts, corners, polygons.deforms)
         owner = np.zeros(len(counts), int)
         if surface is not None:
             points, counts, corners = surface.points, surface.counts, surface.corners
             if normals and surface.normals:
                 why = "UsdGeom gives them no meaning; a mesh of polygons has subdivisionScheme = none"
                 self.report.note(prim.GetPath(), "authored normals of a subdivision surface are not used", why)
+                polygons.normals = None
             normals = surface.normals or (normals and surface.carry(normals))
         with np.errstate(invalid="ignore", over="ignore"):  # the faces of such points go below
             triangles, faces = triangulate(points, counts, corners) if surface is None else surface.triangles
@@ -206,10 +221,8 @@ class MeshReader:
         points = np.where(np.isfinite(points), points, 0.0)
         if prim.GetAttribute("orientation").Get() == UsdGeom.Tokens.leftHanded:
             triangles = triangles[:, ::-1]
-        if normals is None and surface is None and self._is_cage(prim):
-            normals = _smooth_normals(points, corners, triangles)
-        if normals is not None:
-            normals = _unit(normals, points, corners, triangles)
+        smooth = normals is None and surface is None and self._is_cage(prim)
+        normals = _finished(normals, smooth, points, corners, triangles)
 
         for number, subset in enumerate(subsets, start=1):
             members = as_rows(UsdGeom.Subset(subset).GetIndicesAttr().Get(self.code), 1, int)
@@ -219,51 +232,54 @@ class MeshReader:
             members = members[inside]
             owner[members[owner[members] == 0]] = number
         double_sided = bool(prim.GetAttribute("doubleSided").Get(self.code) or False)
-        pieces = []
+        pieces, parts = [], []
         for number, look in enumerate(bound):
             chosen = triangles[owner[parents] == number]
             if len(chosen):
-                piece = self._piece(authored, look, double_sided, points, corners, normals, chosen)
+                piece, corner = self._piece(authored, look, double_sided, points, corners, normals, chosen)
                 if number:
                     piece.primitive["extras"] = {"usdPath": str(subsets[number - 1].GetPath())}
                 pieces.append(piece)
+                parts.append(Part(piece.primitive, corner))
         self.report.count("meshes")
         self.report.count("triangles", len(triangles))
-        return MeshSource(str(prim.GetPath()), prim.GetName(), pieces, points, corners[triangles])
+        motion = self._motion(authored, polygons, parts, corners, triangles, smooth) if polygons.deforms else None
+        return MeshSource(str(prim.GetPath()), prim.GetName(), pieces, points, corners[triangles], motion)
 
-    def _polygons(self, prim: Usd.Prim) -> tuple[np.ndarray, np.ndarray, np.ndarray, CornerValues | None] | None:
-        """Points, corner counts, corners, and normals; None (reported) if they make no mesh."""
-        path = prim.GetPath()
-        if prim.GetTypeName() in gprims.TYPES:
-            shape = gprims.build(prim, self.code)
-            normals = CornerValues(shape.normals, np.arange(len(shape.corners)))
-            return shape.points, shape.counts, shape.corners, normals
-        mesh = UsdGeom.Mesh(prim)
-        attributes = {
-            "points": mesh.GetPointsAttr(),
-            "faceVertexCounts": mesh.GetFaceVertexCountsAttr(),
-            "faceVertexIndices": mesh.GetFaceVertexIndicesAttr(),
-        }
-        for name, attribute in attributes.items():
-            if changes(attribute, self.frames):
-                self.report.about("animation").warn(path, f"animated {name}", "deforming meshes have no carrier; the first frame is used")
-        points = as_rows(attributes["points"].Get(self.code), 3)
-        counts = as_rows(attributes["faceVertexCounts"].Get(self.code), 1, int)
-        corners = as_rows(attributes["faceVertexIndices"].Get(self.code), 1, int)
-        if not (len(points) and len(counts) and len(corners)):
-            self.report.warn(path, "mesh without faces", "it is left out")
+    def _motion(
+        self,
+        mesh: Authored,
+        polygons: Polygons,
+        parts: list[Part],
+        corners: np.ndarray,
+        triangles: np.ndarray,
+        smooth: bool,
+    ) -> Motion | None:
+        """How a mesh deforms; None (reported) if that cannot be carried."""
+        corner = np.concatenate([part.corner for part in parts])
+
+        def shape(code: float) -> np.ndarray:
+            """Points and normals of all vertices, made as those of the first frame are."""
+            points, normals = self.polygons.at(mesh.prim, code, polygons)
+            points = np.where(np.isfinite(points), points, 0.0)
+            if mesh.surface is not None:
+                points, own = mesh.surface.shape(points)
+                normals = own or (normals and mesh.surface.carry(normals))
+            normals = _finished(normals, smooth, points, corners, triangles)
+            rows = [points[corners[corner]]]
+            if normals is not None:
+                rows.append(normals.values[normals.index[corner]])
+            return np.hstack(rows).astype(np.float32)
+
+        try:
+            motion = self.deformer.carry(parts, shape)
+            if motion is not None and motion.near > NOISE:
+                why = f"all keys are too many bytes; those that are kept show its points to {motion.near:g} of its largest coordinate"
+                self.report.about("animation").warn(mesh.prim.GetPath(), "deformation with fewer keys", why)
+            return motion
+        except (Unlike, TooMuch) as why:
+            self.polygons.lose(mesh.prim, polygons, why)
             return None
-        if (counts < 0).any() or counts.sum() != len(corners):
-            why = f"faceVertexCounts sum to {counts.sum()}, faceVertexIndices are {len(corners)}; it is left out"
-            self.report.warn(path, "mesh with a broken topology", why)
-            return None
-        if corners.min() < 0 or corners.max() >= len(points):
-            why = f"faceVertexIndices run from {corners.min()} to {corners.max()}, points are {len(points)}"
-            self.report.warn(path, "mesh with a broken topology", f"{why}; it is left out")
-            return None
-        normals = read_normals(prim, self.code, counts, corners, self.report)
-        points, normals = self.skinning.pose(prim, points, corners, normals)
-        return points, counts, corners, normals
 
     def _holes(self, prim: Usd.Prim) -> np.ndarray:
         attribute = prim.GetAttribute("holeIndices")
@@ -288,8 +304,8 @@ class MeshReader:
         corners: np.ndarray,
         normals: CornerValues | None,
         triangles: np.ndarray,
-    ) -> Piece:
-        """The primitive of some of a mesh's triangles."""
+    ) -> tuple[Piece, np.ndarray]:
+        """The primitive of some of a mesh's triangles, and the corner (n,) that each of its vertices is."""
         values: dict[str, CornerValues] = {}
         if normals is not None:
             values["NORMAL"] = normals
@@ -309,8 +325,8 @@ class MeshReader:
             else:
                 tint = (1.0, 1.0, 1.0, 1.0)
                 values["COLOR_0"] = color
-        primitive = self._primitive(points, corners, values, triangles)
-        return Piece(primitive, look, double_sided, tint, translucent)
+        primitive, corner = self._primitive(points, corners, values, triangles)
+        return Piece(primitive, look, double_sided, tint, translucent), corner
 
     def _primvar(self, mesh: Authored, name: str, width: int) -> CornerValues | None:
         """A primvar on the corners of the mesh, or of its refined surface; None if there is none."""
@@ -352,8 +368,8 @@ class MeshReader:
 
     def _primitive(
         self, points: np.ndarray, corners: np.ndarray, values: dict[str, CornerValues], triangles: np.ndarray
-    ) -> dict:
-        """Weld equal corners and store the attributes."""
+    ) -> tuple[dict, np.ndarray]:
+        """Weld equal corners and store the attributes; the corner (n,) of each vertex."""
         used = triangles.reshape(-1)
         key = corners[used]
         for found in values.values():
@@ -361,7 +377,7 @@ class MeshReader:
             if found.exact and found.index is not corners:
                 key = _paired(key, index)
             elif found.index is not corners:
-                key = _refined(key, found.values.astype(np.float32)[index])
+                key = refined(key, found.values.astype(np.float32)[index])
         _, first, index = np.unique(key, return_index=True, return_inverse=True)
         vertex = used[first]
         attributes = {
@@ -370,7 +386,16 @@ class MeshReader:
         for name, found in values.items():
             array = found.values[found.index[vertex]].astype(np.float32)
             attributes[name] = self.document.accessor(array, 34962)
-        return {"attributes": attributes, "indices": self.document.indices(index.reshape(-1))}
+        return {"attributes": attributes, "indices": self.document.indices(index.reshape(-1))}, vertex
+
+
+def _finished(
+    normals: CornerValues | None, smooth: bool, points: np.ndarray, corners: np.ndarray, triangles: np.ndarray
+) -> CornerValues | None:
+    """The normals that are exported: unit ones, or `smooth` ones."""
+    if smooth:
+        normals = smooth_normals(points, corners, triangles)
+    return None if normals is None else unit_normals(normals, points, corners, triangles)
 
 
 def _material_subsets(prim: Usd.Prim) -> list[Usd.Prim]:
@@ -388,47 +413,3 @@ def _paired(key: np.ndarray, index: np.ndarray) -> np.ndarray:
     if int(key.max(initial=0)) >= (1 << 62) // width:
         _, key = np.unique(key, return_inverse=True)
     return key * width + index
-
-
-def _refined(key: np.ndarray, rows: np.ndarray) -> np.ndarray:
-    """Keys that tell apart what `key` does and, besides, different rows."""
-    _, key = np.unique(key, return_inverse=True)
-    for column in rows.T + np.float32(0):
-        bits = np.ascontiguousarray(column).view(np.uint32).astype(np.uint64)
-        _, key = np.unique((key.astype(np.uint64) << np.uint64(32)) | bits, return_inverse=True)
-    return key
-
-
-def _area_normals(points: np.ndarray, corners: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """For each point the sum of the area vectors around it."""
-    index = corners[triangles]
-    corner = points[index]
-    area = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
-    total = np.zeros((len(points), 3))
-    for axis in range(3):
-        total[:, axis] = np.bincount(index.reshape(-1), np.repeat(area[:, axis], 3), minlength=len(points))
-    return total
-
-
-def _smooth_normals(points: np.ndarray, corners: np.ndarray, triangles: np.ndarray) -> CornerValues:
-    """Vertex normals weighted by area."""
-    return CornerValues(_area_normals(points, corners, triangles), corners)
-
-
-def _unit(normals: CornerValues, points: np.ndarray, corners: np.ndarray, triangles: np.ndarray) -> CornerValues:
-    """Unit normals. Where one is zero, the geometric one at its point, and at worst +Z."""
-    length = np.linalg.norm(normals.values, axis=1, keepdims=True)
-    if (length > 0).all():
-        return replace(normals, values=normals.values / length)
-    if normals.exact:
-        place = np.zeros(len(length), int)
-        place[normals.index] = corners
-        geometric = np.where(length > 0, normals.values, _area_normals(points, corners, triangles)[place])
-        length = np.linalg.norm(geometric, axis=1, keepdims=True)
-        return replace(normals, values=np.where(length > 0, geometric / np.where(length > 0, length, 1.0), [0.0, 0.0, 1.0]))
-    spread = normals.values[normals.index]
-    geometric = _area_normals(points, corners, triangles)[corners]
-    spread = np.where(np.linalg.norm(spread, axis=1, keepdims=True) > 0, spread, geometric)
-    length = np.linalg.norm(spread, axis=1, keepdims=True)
-    spread = np.where(length > 0, spread / np.where(length > 0, length, 1.0), [0.0, 0.0, 1.0])
-    return CornerValues(spread, np.arange(len(corners)))

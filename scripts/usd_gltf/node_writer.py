@@ -58,20 +58,21 @@ class NodeWriter:
         PointInstancers."""
         world = (prim.local if prim.resets else above @ prim.local) if prim.lit else above
         if prim.local.ndim == 3:
-            node, outer = self._moving(path, prim.name, prim.local)
+            index, outer = self._moving(path, prim.name, prim.local)
         else:
             if id(prim) not in self._still:
                 self._still[id(prim)] = _still(prim.local)
-            node, outer = self._placed(path, prim.name, *self._still[id(prim)])
-        self._fill(node, prim, path, world, chain)
+            index, outer = self._placed(path, prim.name, *self._still[id(prim)])
+        self._fill(index, prim, path, world, chain)
         if not prim.resets:
             return outer
         # The child of no one: it stands by its own matrix alone.
         self._top.append(outer)
         return -1
 
-    def _fill(self, node: dict, prim: Prim, path: str, world: np.ndarray, chain: Place) -> None:
+    def _fill(self, index: int, prim: Prim, path: str, world: np.ndarray, chain: Place) -> None:
         """Content and children of a node."""
+        node = self.document.nodes[index]
         if prim.camera is not None:
             camera, extras = prim.camera
             node["camera"] = self.document.shared("cameras", camera)
@@ -85,6 +86,9 @@ class NodeWriter:
             node["extras"]["usdLux"].update(self.linking.light(prim))
         elif mesh is not None:
             node["mesh"] = self._mesh(mesh)
+            if mesh.motion is not None:
+                mesh.motion.animate(self.document, index)
+                self.report.count("animation channels")
             keys = prim.mesh.glow_keys()
             if keys is not None:
                 values = strength_keys(self.frames, keys)
@@ -101,6 +105,8 @@ class NodeWriter:
     def _mesh(self, mesh: MeshSource) -> int:
         if id(mesh) not in self._meshes:
             body = {"name": mesh.name, "primitives": mesh.primitives(self.materials)}
+            if mesh.motion is not None:
+                body["extras"] = {"targetNames": mesh.motion.names}
             self._meshes[id(mesh)] = self.document.shared("meshes", body)
         return self._meshes[id(mesh)]
 
@@ -117,34 +123,34 @@ class NodeWriter:
             name = f"{path}[{number}]"
             matrix = matrices[:, position] if moving else matrices[position]
             if moving:
-                node, outer = self._moving(name, prototype.name, matrix)
+                index, outer = self._moving(name, prototype.name, matrix)
             elif static[3][position] > SHEAR_TOLERANCE:
-                node, outer = self._placed(name, prototype.name, *_still(matrix))
+                index, outer = self._placed(name, prototype.name, *_still(matrix))
             else:
                 place = _place(*(part[position] for part in static[:3]))
-                node, outer = self._placed(name, prototype.name, place, None)
-            self._fill(node, prototype, name, world @ matrix if prototype.lit else world, chain)
+                index, outer = self._placed(name, prototype.name, place, None)
+            self._fill(index, prototype, name, world @ matrix if prototype.lit else world, chain)
             nodes.append(outer)
         return nodes
 
-    def _placed(self, path: str, name: str, place: dict, outside: dict | None) -> tuple[dict, int]:
-        """A node that stands still, and the index of the node to hang under the parent."""
+    def _placed(self, path: str, name: str, place: dict, outside: dict | None) -> tuple[int, int]:
+        """The index of a node that stands still, and that of the node to hang under the parent."""
         node = {"name": name, "extras": {"usdPath": path}, **place}
         index = self.document.node(node)
         if outside is None:
-            return node, index
-        return node, self.document.node({"name": f"{name}_shear", "children": [index], **outside})
+            return index, index
+        return index, self.document.node({"name": f"{name}_shear", "children": [index], **outside})
 
-    def _moving(self, path: str, name: str, local: np.ndarray) -> tuple[dict, int]:
-        """A node that follows `local` (times, 4, 4), and the index of the node to hang under the
+    def _moving(self, path: str, name: str, local: np.ndarray) -> tuple[int, int]:
+        """The index of a node that follows `local` (times, 4, 4), and that of the node to hang under the
         parent. Shear takes two nodes, and is exact at every frame."""
         sheared = decompose(local)[3].max() > SHEAR_TOLERANCE
         outside, inside = split_shear(local) if sheared else (None, local)
         node = {"name": name, "extras": {"usdPath": path}}
         index = self._following(node, inside)
         if outside is None:
-            return node, index
-        return node, self._following({"name": f"{name}_shear", "children": [index]}, outside)
+            return index, index
+        return index, self._following({"name": f"{name}_shear", "children": [index]}, outside)
 
     def _following(self, node: dict, local: np.ndarray) -> int:
         """Index of `node`, made to follow matrices without shear."""

@@ -167,9 +167,10 @@ class PrimTree:
         if kind == "Volume":
             compiled.fog = read_fog(prim, self.frames, self.report.about("other"))
         if prim.IsA(UsdGeom.Mesh) or kind in gprims.TYPES:
-            compiled.mesh = self.meshes.read(prim)
             light_prim = geometry_light or prim
-            if compiled.mesh is not None and light_type(light_prim) is not None:
+            is_light = light_type(light_prim) is not None
+            compiled.mesh = self.meshes.read(prim, is_light)
+            if compiled.mesh is not None and is_light:
                 compiled.light = self._light(light_prim, "MeshLight")
                 compiled.light_path = str(light_prim.GetPath())
                 self._lit_geometry.add(str(path))

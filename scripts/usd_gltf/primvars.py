@@ -56,13 +56,21 @@ def spread(
 
 
 def read_primvar(
-    prim: Usd.Prim, name: str, width: int, code: float, counts: np.ndarray, corners: np.ndarray, report: Notebook
+    prim: Usd.Prim,
+    name: str,
+    width: int,
+    code: float,
+    counts: np.ndarray,
+    corners: np.ndarray,
+    report: Notebook,
+    over_time: bool = False,
 ) -> CornerValues | None:
-    """The primvar `name` (inherited ones too) with `width` numbers a value; None if there is none."""
+    """The primvar `name` (inherited ones too) with `width` numbers a value; None if there is none. It is reported if
+    it varies, unless it is read `over_time`."""
     primvar = UsdGeom.PrimvarsAPI(prim).FindPrimvarWithInheritance(name)
     if not primvar or not primvar.HasValue():
         return None
-    if primvar.ValueMightBeTimeVarying() and primvar.GetAttr().GetNumTimeSamples() > 1:
+    if not over_time and primvar.ValueMightBeTimeVarying() and primvar.GetAttr().GetNumTimeSamples() > 1:
         report.about("animation").warn(prim.GetPath(), f"animated primvars:{name}", "the first frame's values are used")
     interpolation = primvar.GetInterpolation()
     values = as_rows(primvar.Get(code), width).reshape(-1, width)
@@ -75,11 +83,20 @@ def read_primvar(
     return finite(found)
 
 
+def normals_may_vary(prim: Usd.Prim) -> bool:
+    """Whether what `read_normals` finds may depend on the time."""
+    primvar = UsdGeom.PrimvarsAPI(prim).FindPrimvarWithInheritance("normals")
+    if primvar and primvar.HasValue():
+        return primvar.ValueMightBeTimeVarying()
+    attribute = prim.GetAttribute("normals")
+    return bool(attribute) and attribute.ValueMightBeTimeVarying()
+
+
 def read_normals(
-    prim: Usd.Prim, code: float, counts: np.ndarray, corners: np.ndarray, report: Notebook
+    prim: Usd.Prim, code: float, counts: np.ndarray, corners: np.ndarray, report: Notebook, over_time: bool = False
 ) -> CornerValues | None:
     """`primvars:normals`, else the `normals` attribute of a point-based prim."""
-    found = read_primvar(prim, "normals", 3, code, counts, corners, report)
+    found = read_primvar(prim, "normals", 3, code, counts, corners, report, over_time)
     if found is not None:
         return found
     attribute = prim.GetAttribute("normals")

@@ -2,8 +2,7 @@
 
 UsdSkel's own queries do the work (UsdSkelSkinningQuery, UsdSkelBlendShapeQuery), in the order of
 UsdSkelBakeSkinning, which would write to the stage; nothing is written here. A mesh whose joints move it as a
-whole is moved, over time too. Shapes that change have no carrier: of them the pose of the first frame is
-exported, and what moves on from it is reported.
+whole is moved; of another, `polygons` asks for the pose at each time.
 """
 
 from __future__ import annotations
@@ -64,6 +63,8 @@ class Skinning:
     def __init__(self, stage: Usd.Stage, frames: Frames, report: Notebook) -> None:
         self.frames, self.report = frames, report
         self._bindings: dict[str, Binding] = {}
+        self._as_they_stand: set[str] = set()
+        """Meshes that cannot be posed."""
         cache = UsdSkel.Cache()
         for prim in Usd.PrimRange(stage.GetPseudoRoot(), PROTOTYPE_PREDICATE):
             if not prim.IsA(UsdSkel.Root):
@@ -112,24 +113,49 @@ class Skinning:
     def pose(
         self, prim: Usd.Prim, points: np.ndarray, corners: np.ndarray, normals: CornerValues | None
     ) -> tuple[np.ndarray, CornerValues | None]:
-        """Points (v, 3) and normals of a mesh in the pose of the first frame; as they are if nothing deforms it."""
-        binding, path, code = self._bindings.get(str(prim.GetPath())), prim.GetPath(), self.frames.first
-        if binding is None:
-            if prim.GetAttribute("primvars:skel:jointIndices").HasAuthoredValue():
-                why = "no SkelRoot above it binds it to a skeleton that is there; it is exported as its points stand"
-                self.report.warn(path, "skinned mesh", why)
-            return points, normals
-        if binding.is_rigid:
-            return points, normals
+        """Points (v, 3) and normals of a mesh in the pose of the first frame; as they are if nothing deforms it, or
+        it cannot be posed (reported)."""
+        path = str(prim.GetPath())
+        if path not in self._bindings and prim.GetAttribute("primvars:skel:jointIndices").HasAuthoredValue():
+            why = "no SkelRoot above it binds it to a skeleton that is there; it is exported as its points stand"
+            self.report.warn(path, "skinned mesh", why)
         try:
-            posed = self._posed(binding, points, corners, normals, code)
-            if any(self._moved(binding, other, points, posed[0]) for other in self.frames.codes):
-                why = f"deforming meshes have no carrier; the pose of frame {code:g} is used"
-                self.report.about("animation").warn(path, "skinned mesh that deforms", why)
+            return self.posed(prim, points, corners, normals, self.frames.first)
         except (ValueError, np.linalg.LinAlgError) as error:
             self._unposed(prim, error)
+            self._as_they_stand.add(path)
             return points, normals
-        return posed
+
+    def posed(
+        self, prim: Usd.Prim, points: np.ndarray, corners: np.ndarray, normals: CornerValues | None, code: float
+    ) -> tuple[np.ndarray, CornerValues | None]:
+        """The same at any time. Raises ValueError or LinAlgError with what is wrong."""
+        binding = self._deforming(prim)
+        return (points, normals) if binding is None else self._posed(binding, points, corners, normals, code)
+
+    def may_deform(self, prim: Usd.Prim) -> bool:
+        """Whether a skeleton deforms the mesh, and its pose changes."""
+        return self._deforming(prim) is not None and any(self.differs(prim, code) for code in self.frames.codes)
+
+    def differs(self, prim: Usd.Prim, code: float) -> bool:
+        """Whether what decides the pose of a mesh is other than at the first frame, by more than rounding, or cannot be
+        told. Joints that move may still be none that it follows."""
+        binding = self._deforming(prim)
+        if binding is None or code == self.frames.first:
+            return False
+        try:
+            first, now = binding.state(self.frames.first), binding.state(code)
+        except (ValueError, np.linalg.LinAlgError):
+            return True
+        return not all(
+            a.shape == b.shape and np.allclose(a, b, rtol=1e-6, atol=1e-6) for a, b in zip(first, now, strict=True)
+        )
+
+    def _deforming(self, prim: Usd.Prim) -> Binding | None:
+        """What deforms a mesh, if anything does."""
+        path = str(prim.GetPath())
+        binding = self._bindings.get(path)
+        return None if binding is None or binding.is_rigid or path in self._as_they_stand else binding
 
     def _posed(self, binding: Binding, points, corners, normals, code: float) -> tuple[np.ndarray, CornerValues | None]:
         """The same; ValueError says what is wrong with the binding."""
@@ -147,19 +173,6 @@ class Skinning:
         if normals is None:
             return found, None
         return found, _turn(binding, len(points), corners, normals, turned, space, code)
-
-    def _moved(self, binding: Binding, code: float, points: np.ndarray, posed: np.ndarray) -> bool:
-        """Whether the pose at a time is another than the first frame's, by more than rounding."""
-        first, now = binding.state(self.frames.first), binding.state(code)
-        near = [
-            a.shape == b.shape and np.allclose(a, b, rtol=1e-6, atol=1e-6) for a, b in zip(first, now, strict=True)
-        ]
-        if not all(near[:2]):
-            return True
-        # Joints that move may be none that this mesh follows.
-        return not all(near) and not np.allclose(
-            posed, self._posed(binding, points, np.array([]), None, code)[0], rtol=0, atol=1e-6 * np.abs(posed).max(initial=0)
-        )
 
 
 def _as_placed(skeleton: Usd.Prim, mesh: Usd.Prim) -> Usd.Prim:

@@ -22,7 +22,7 @@ from .primvars import CornerValues, as_rows
 from .report import Notebook
 from .stage import Frames, changes
 from .subdivision_masks import limit, refine, refine_linear
-from .subdivision_normals import limit_normals
+from .subdivision_normals import LimitNormals
 from .subdivision_seams import torn
 from .subdivision_topology import INFINITE, Topology, boundaries, build, crease, sharpen_vertices, split_to_quads, split_to_triangles
 from .triangulate import triangulate
@@ -87,11 +87,20 @@ class Surface:
         first = np.arange(len(mesh.faces)) if self._triangular else mesh.topology.face
         self._own_face = np.repeat(first, 4**level if self._triangular else 4 ** (level - 1))
         self.parents, self.hidden = mesh.faces[self._own_face], hidden[self._own_face]
-        self.points, self.normals = self._refine(self._levels, mesh.points, self._linear), None
-        if not self._linear:
-            normals, index = limit_normals(self._levels[-1], self.points, self._triangular)
-            self.normals = CornerValues(-normals if rules.left_handed else normals, index, exact=True)
-            self.points = limit(self._levels[-1], self.points, self._triangular)
+        self.points, self.normals = self.shape(mesh.points)
+
+    def shape(self, points: np.ndarray) -> tuple[np.ndarray, CornerValues | None]:
+        """`points` and `normals` for other points (v, 3) of the mesh, which are finite."""
+        points, last = self._refine(self._levels, points, self._linear), self._levels[-1]
+        if self._linear:
+            return points, None
+        normals = self._facing(points)
+        facing = CornerValues(-normals if self._rules.left_handed else normals, self._facing.index, exact=True)
+        return limit(last, points, self._triangular), facing
+
+    @cached_property
+    def _facing(self) -> LimitNormals:
+        return LimitNormals(self._levels[-1], self._triangular)
 
     @cached_property
     def triangles(self) -> tuple[np.ndarray, np.ndarray]:
@@ -147,9 +156,11 @@ class Subdivider:
         self._faces = 0
         self._kept: OrderedDict[bytes, Surface] = OrderedDict()
 
-    def surface(self, prim: Usd.Prim, points: np.ndarray, counts: np.ndarray, corners: np.ndarray) -> Surface | None:
-        """A mesh's surface, or None if it is no subdivision surface, is bilinear and flat, or cannot be refined
-        (the last is reported). Faces with `points` that are not finite, or of fewer than three corners, are no part of it."""
+    def surface(
+        self, prim: Usd.Prim, points: np.ndarray, counts: np.ndarray, corners: np.ndarray, deforms: bool
+    ) -> Surface | None:
+        """A mesh's surface, or None if it is no subdivision surface, is bilinear and flat (and stays so), or cannot be
+        refined (the last is reported). Faces with `points` that are not finite, or of fewer than three corners, are no part of it."""
         mesh, code = UsdGeom.Mesh(prim), self.frames.first
         scheme = str(mesh.GetSubdivisionSchemeAttr().Get(code))
         if scheme == "none" or self.level == 0:
@@ -157,7 +168,7 @@ class Subdivider:
         lost = np.bincount(np.repeat(np.arange(len(counts)), counts)[~np.isfinite(points).all(axis=1)[corners]], minlength=len(counts))
         usable = (counts > 2) & (lost == 0)
         faces, kept = np.flatnonzero(usable), np.repeat(usable, counts)
-        if scheme == "bilinear" and _flat(points, counts[faces], corners[kept]):
+        if scheme == "bilinear" and not deforms and _flat(points, counts[faces], corners[kept]):
             return None
         if not len(faces) or not self._can_be_refined(prim.GetPath(), scheme, counts[faces]):
             return None

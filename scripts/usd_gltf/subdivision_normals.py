@@ -14,38 +14,49 @@ from .subdivision_masks import kinds
 from .subdivision_topology import Topology, fans
 
 
-def limit_normals(level: Topology, points: np.ndarray, triangular: bool) -> tuple[np.ndarray, np.ndarray]:
-    """Normals (n, 3) of any length, and the one (c,) of each corner.
+class LimitNormals:
+    """The runs of faces of a level, whose normals are asked for as often as its points move.
 
-    `points` (v, 3) are the level's own, not those of the limit; faces are quads, or triangles if
-    `triangular`. Edges of sharpness 1 and more are creases.
+    Faces are quads, or triangles if `triangular`. Edges of sharpness 1 and more are creases.
     """
-    cut = level.edge_sharpness >= 1.0
-    after = np.where(cut[level.edge[level.previous]], -1, level.twin[level.previous])
-    last, place, closed = fans(level, after)
-    is_run = np.bincount(last, minlength=len(last)) > 0
-    runs, run = np.flatnonzero(is_run), (np.cumsum(is_run) - 1)[last]
-    size, vertex = place[runs] + 1, level.corners[runs]
-    kind = kinds(level, cut, level.vertex_sharpness >= 1.0)[vertex]
-    # Around a dart the faces go from the sharp edge to itself: the surface is smooth there.
-    smooth = (closed[runs] | (level.incident(cut)[vertex] == 1)) & (kind < 2) & (size > 2)
-    crease = (kind == 2) & ~closed[runs]
-    shape = np.select([smooth, crease], [1, 2], 0)
 
-    first = np.cumsum(size) - size
-    in_order = np.empty(len(level.corners), int)
-    in_order[first[run] + place] = np.arange(len(level.corners))
-    normals = np.empty((len(runs), 3))
-    codes = size * 3 + shape
-    alike = np.argsort(codes, kind="stable")
-    for some in np.split(alike, np.flatnonzero(np.diff(codes[alike])) + 1):
-        corners = in_order[first[some][:, None] + np.arange(size[some[0]])]
-        normals[some] = (_of_corners, _of_smooth, _of_creases)[shape[some[0]]](level, points, corners, triangular)
-    if len(runs) == np.count_nonzero(level.valence):
-        spread = np.tile([0.0, 0.0, 1.0], (level.vertices, 1))
-        spread[vertex] = normals
-        return spread, level.corners
-    return normals, run
+    def __init__(self, level: Topology, triangular: bool) -> None:
+        self._level, self._triangular = level, triangular
+        cut = level.edge_sharpness >= 1.0
+        after = np.where(cut[level.edge[level.previous]], -1, level.twin[level.previous])
+        last, place, closed = fans(level, after)
+        is_run = np.bincount(last, minlength=len(last)) > 0
+        runs, run = np.flatnonzero(is_run), (np.cumsum(is_run) - 1)[last]
+        size, vertex = place[runs] + 1, level.corners[runs]
+        kind = kinds(level, cut, level.vertex_sharpness >= 1.0)[vertex]
+        # Around a dart the faces go from the sharp edge to itself: the surface is smooth there.
+        smooth = (closed[runs] | (level.incident(cut)[vertex] == 1)) & (kind < 2) & (size > 2)
+        crease = (kind == 2) & ~closed[runs]
+        shape = np.select([smooth, crease], [1, 2], 0)
+
+        first = np.cumsum(size) - size
+        in_order = np.empty(len(level.corners), int)
+        in_order[first[run] + place] = np.arange(len(level.corners))
+        codes = size * 3 + shape
+        alike = np.argsort(codes, kind="stable")
+        self._count, self._groups = len(runs), []
+        for some in np.split(alike, np.flatnonzero(np.diff(codes[alike])) + 1):
+            corners = in_order[first[some][:, None] + np.arange(size[some[0]])]
+            self._groups.append((some, corners, (_of_corners, _of_smooth, _of_creases)[shape[some[0]]]))
+        self._vertex = vertex if len(runs) == np.count_nonzero(level.valence) else None
+        self.index = run if self._vertex is None else level.corners
+        """(c,) the normal of each corner."""
+
+    def __call__(self, points: np.ndarray) -> np.ndarray:
+        """Normals (n, 3) of any length. `points` (v, 3) are the level's own, not those of the limit."""
+        normals = np.empty((self._count, 3))
+        for some, corners, rule in self._groups:
+            normals[some] = rule(self._level, points, corners, self._triangular)
+        if self._vertex is None:
+            return normals
+        spread = np.tile([0.0, 0.0, 1.0], (self._level.vertices, 1))
+        spread[self._vertex] = normals
+        return spread
 
 
 def _of_corners(level: Topology, points: np.ndarray, corners: np.ndarray, triangular: bool) -> np.ndarray:

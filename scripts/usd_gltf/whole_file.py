@@ -26,15 +26,15 @@ def _own_prefix() -> str:
     return f"{PREFIX}{boot.split('-')[0].strip()}-"
 
 
-def write_atomically(path: Path, data: bytes) -> None:
-    """Write to a temporary file in the same folder, flush it to the disk, rename it. The file is as
-    open as the user's mask allows."""
+def write_atomically(path: Path, *parts: bytes) -> None:
+    """Write `parts`, one after another, to a temporary file in the same folder, flush it to the disk, rename
+    it. The file is as open as the user's mask allows."""
     path.parent.mkdir(parents=True, exist_ok=True)
     sweep(path.parent)
     file, temporary = _temporary_file(path.parent)
     try:
         with file:
-            file.write(data)
+            file.writelines(parts)
             file.flush()
             mask = os.umask(0)
             os.umask(mask)

@@ -104,6 +104,27 @@ class Gltf:
         indices = self.accessor(self.primitives(path)[primitive]["indices"]).reshape(-1, 3)
         return self.attribute(path, "POSITION", primitive)[indices].astype(float)
 
+    def weights(self, path: str, seconds: float) -> np.ndarray:
+        """Weights of a node's morph targets, linear between keys and held outside."""
+        count = len(self.primitives(path)[0].get("targets", []))
+        if "weights" not in self.channels(path):
+            return np.zeros(count)
+        times, values = self.channels(path)["weights"]
+        return np.array([np.interp(seconds, times, column) for column in values.reshape(len(times), count).T])
+
+    def deformed(self, path: str, seconds: float, name: str = "POSITION", primitive: int = 0) -> np.ndarray:
+        """An attribute with the morph targets of a time added."""
+        found = self.attribute(path, name, primitive).astype(float)
+        for weight, target in zip(self.weights(path, seconds), self.primitives(path)[primitive].get("targets", []), strict=True):
+            found = found + weight * self.accessor(target[name])
+        return found
+
+    def deformed_triangles(self, path: str, seconds: float, primitive: int = 0) -> np.ndarray:
+        """World corner positions (t, 3, 3) at a time."""
+        indices = self.accessor(self.primitives(path)[primitive]["indices"]).reshape(-1, 3)
+        world = self.world(path, seconds)
+        return self.deformed(path, seconds, primitive=primitive)[indices] @ world[:3, :3].T + world[:3, 3]
+
     def area_vectors(self, path: str, primitive: int = 0) -> np.ndarray:
         corners = self.triangles(path, primitive)
         return np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]) / 2

@@ -193,22 +193,20 @@ def test_a_subdivision_surface_is_refined_as_it_is_posed(export):
         assert np.linalg.norm(corners - corner, axis=1).min() < 1e-5
 
 
-def test_what_deforms_is_named_and_what_is_held_is_not(export):
-    moving = export(figure(mesh(SKIN) + "\n" + mesh("", "Still")), "--frames", "1-2")
-    assert [(w["category"], w["path"], w["what"]) for w in moving.report["warnings"]] == [
-        ("animation", "/Figure/M", "skinned mesh that deforms")
-    ]
-    assert "the pose of frame 1 is used" in moving.said()
-    assert export(figure(mesh(SKIN)), "--frames", "1", "--strict").code == 0
-    assert export(figure(mesh(SKIN), HELD), "--frames", "1-2", "--strict").code == 0
+def test_what_deforms_has_targets_and_what_is_held_has_none(export):
+    moving = export(figure(mesh(SKIN) + "\n" + mesh("", "Still")), "--frames", "1-2", "--strict")
+    assert moving.code == 0, moving.err
+    assert [len(Gltf(moving.path).primitives(f"/Figure/{name}")[0].get("targets", [])) for name in ("M", "Still")] == [1, 0]
+    for text, frames in ((figure(mesh(SKIN)), "1"), (figure(mesh(SKIN), HELD), "1-2")):
+        still = export(text, "--frames", frames, "--strict")
+        assert still.code == 0
+        assert "targets" not in still.path.read_bytes().decode("latin-1")
     # It follows the joint that stands still, softly; another mesh follows the one that moves.
     tip = "rotations.timeSamples = { 1: [(1, 0, 0, 0), (1, 0, 0, 0)], 2: [(1, 0, 0, 0), (0.8, 0, 0, 0.6)] }"
     rooted = SKIN.replace("[1, 0, 0.5, 0.5, 0, 1, 1, 0, 0.4, 0.6, 0, 1]", "[1, 0, 0.5, 0, 1, 0, 1, 0, 0.4, 0, 1, 0]")
     assert rooted != SKIN
-    apart = export(figure(mesh(rooted, "Root") + "\n" + mesh(SKIN), tip), "--frames", "1-2")
-    assert [w["path"] for w in apart.report["warnings"]] == ["/Figure/M"]
-    shapes = export(figure(SHAPES, HELD, WEIGHTS), "--frames", "1-2")
-    assert shapes.warned() == {"skinned mesh that deforms"}
+    apart = Gltf(export(figure(mesh(rooted, "Root") + "\n" + mesh(SKIN), tip), "--frames", "1-2").path)
+    assert [len(apart.primitives(f"/Figure/{name}")[0].get("targets", [])) for name in ("Root", "M")] == [0, 1]
 
 
 def test_joints_that_move_a_mesh_as_a_whole_move_its_node_over_time(export):
