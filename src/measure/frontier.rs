@@ -54,6 +54,11 @@ pub fn reach(points: &[Point], error: f64) -> Option<Reach> {
     };
     let low = points[last];
     let (exponent, per_sample, is_beyond) = match points.get(last + 1) {
+        // Two errors may have been asked for and have taken as many.
+        Some(high) if high.samples <= low.samples => {
+            let (samples, seconds) = (high.samples.ceil() as u32, high.seconds);
+            return Some(Reach { samples, seconds, is_beyond: false });
+        }
         Some(high) => (
             (high.samples / low.samples).ln() / (low.error / high.error).ln(),
             (high.seconds - low.seconds) / (high.samples - low.samples),

@@ -15,6 +15,9 @@ pub fn frames_of(scene: &Scene) -> Vec<i32> {
         let of_lights = scene.lights.iter().filter_map(|light| light.values.as_ref());
         let of_meshes = scene.instances.iter().filter_map(|instance| instance.values.as_ref());
         let values = of_lights.chain(of_meshes).map(|keys: &Keys<_>| keys.times_s.last());
+        let deformations = scene.meshes.iter().filter_map(|mesh| mesh.deformation.as_ref());
+        let weights = deformations.flat_map(|deformation| deformation.weights.iter());
+        let values = values.chain(weights.map(|keys| keys.times_s.last()));
         let last_s = seconds.chain(values).flatten().fold(0f32, |last, &key| last.max(key));
         f64::from(last_s)
     };

@@ -8,7 +8,7 @@ use crate::light_tree::learned::ViewKeys;
 use crate::render::surface::is_pane;
 use crate::scene::{
     AlphaMode, Camera, Channel, Deformation, Instance, Keys, LightKind, Links, Membership, Mesh,
-    Node, Pose, Scene, Skin,
+    Pose, Scene, Skin,
 };
 use blake3::Hasher;
 use bytemuck::{NoUninit, cast_slice};
@@ -125,6 +125,8 @@ fn shape(scene: &Scene, mesh: &Mesh) -> Key {
     hasher.update_rayon(cast_slice(&mesh.positions));
     hasher.update_rayon(cast_slice(&mesh.triangles));
     if let Some(deformation) = &mesh.deformation {
+        let clock = (scene.timeline.zero_frame, scene.timeline.frames_per_second);
+        hasher.update(format!("{clock:?}").as_bytes());
         add_deformation(&mut hasher, deformation);
     }
     let material = mesh.material.map(|material| &scene.materials[material as usize]);
@@ -153,6 +155,8 @@ fn shape(scene: &Scene, mesh: &Mesh) -> Key {
 /// All that decides how a mesh is bent.
 fn add_deformation(hasher: &mut Hasher, deformation: &Deformation) {
     let Deformation { rest, targets, weights, skin } = deformation;
+    let lengths = (targets.len(), weights.len(), skin.as_ref().map(|skin| skin.influences.len()));
+    hasher.update(format!("{lengths:?}").as_bytes());
     hasher.update_rayon(cast_slice(&rest.positions));
     targets.iter().for_each(|target| {
         hasher.update_rayon(cast_slice(&target.positions));
@@ -163,9 +167,9 @@ fn add_deformation(hasher: &mut Hasher, deformation: &Deformation) {
     influences.iter().for_each(|(joint, weight)| {
         hasher.update(&joint.to_le_bytes()).update(&weight.to_le_bytes());
     });
-    for Node { parent, local, channels, .. } in &skeleton.nodes {
-        hasher.update(format!("{parent:?} {local:?}").as_bytes());
-        channels.iter().for_each(|channel| add_channel(hasher, channel));
+    for (parent, node) in &skeleton.nodes {
+        hasher.update(format!("{parent:?} {:?}", node.local).as_bytes());
+        node.channels.iter().for_each(|channel| add_channel(hasher, channel));
     }
     hasher.update(format!("{:?}", skeleton.joints).as_bytes());
 }

@@ -24,7 +24,7 @@ pub struct Deformation {
     /// What may be added to it.
     pub targets: Vec<Target>,
     /// How much of each target is added, for three targets each.
-    pub weights: Vec<Keys<Vec3>>,
+    pub weights: Arc<[Keys<Vec3>]>,
     /// What moves it then.
     pub skin: Option<Skin>,
 }
@@ -65,8 +65,9 @@ pub struct Skin {
 /// Joints below the node that a mesh hangs at.
 #[derive(Clone, Debug)]
 pub struct Skeleton {
-    /// The joints and what is above them, parents first. One without a parent stands in the mesh's space.
-    pub nodes: Vec<Node>,
+    /// The joints and what is above them, each after its parent, whose number in this list comes first; one without a
+    /// parent stands in the mesh's space. What the nodes themselves say of parents and paths has no meaning.
+    pub nodes: Vec<(Option<u32>, Arc<Node>)>,
     /// By number: the joint's node, and the inverse bind matrix. A joint that moves nothing has no node.
     pub joints: Vec<Option<(u32, DAffine3)>>,
 }
@@ -77,17 +78,16 @@ pub struct Bend {
     /// By morph target.
     weights: Vec<f32>,
     /// By joint: from the vertices at rest to the mesh's space.
-    joints: Vec<DAffine3>,
+    joints: Arc<[DAffine3]>,
 }
 
 impl Deformation {
-    /// How far the mesh is bent at a time, seconds on the clock of a timeline.
-    pub fn bend(&self, time_s: f64, timeline: Timeline) -> Bend {
+    /// How far the mesh is bent at a time, seconds on the clock of a timeline, where its joints are known.
+    fn bend(&self, time_s: f64, timeline: Timeline, joints: Arc<[DAffine3]>) -> Bend {
         let threes = self.weights.iter().map(|keys| keys.at(time_s, timeline).as_vec3());
         let mut weights: Vec<f32> = threes.flat_map(|three| three.to_array()).collect();
         weights.truncate(self.targets.len());
-        let skeleton = self.skin.as_ref().map(|skin| &*skin.skeleton);
-        Bend { weights, joints: skeleton.map_or_else(Vec::new, |s| s.at(time_s, timeline)) }
+        Bend { weights, joints }
     }
 
     /// The shape of the bent mesh, whose triangles are given. A vertex that would be [too far](FARTHEST_M) stays
@@ -128,8 +128,8 @@ impl Skeleton {
     /// By joint: from the vertices at rest to the mesh's space at a time.
     pub fn at(&self, time_s: f64, timeline: Timeline) -> Vec<DAffine3> {
         let mut places: Vec<DAffine3> = Vec::with_capacity(self.nodes.len());
-        for node in &self.nodes {
-            let above = node.parent.map_or(DAffine3::IDENTITY, |parent| places[parent as usize]);
+        for (parent, node) in &self.nodes {
+            let above = parent.map_or(DAffine3::IDENTITY, |parent| places[parent as usize]);
             places.push(above * node.to_parent(time_s, timeline));
         }
         let joint = |joint: &Option<(u32, DAffine3)>| {
@@ -237,33 +237,87 @@ impl Shape {
     }
 }
 
-/// The shapes of all meshes that deform, at the time of a pose. Made when they are first asked for.
+/// The shapes of all meshes that deform, at one time.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Shapes(OnceLock<Vec<Option<Arc<Shape>>>>);
+pub(super) struct Shapes {
+    /// How far each is bent; empty if none deforms.
+    bends: Vec<Bend>,
+    /// By mesh: which of these is its own.
+    rows: Arc<[Option<u32>]>,
+    /// Made when somebody first asks for them; copies share them.
+    made: Arc<[OnceLock<Shape>]>,
+}
 
 impl Shapes {
-    /// The shape of a mesh, given how far each mesh that deforms is bent.
-    pub fn of(&self, scene: &Scene, bends: &[Bend], mesh: u32) -> Option<&Shape> {
-        if bends.is_empty() {
+    /// At a time, seconds on the scene's clock.
+    pub fn at(scene: &Scene, time_s: f64) -> Shapes {
+        let is_bent = |mesh: &Mesh| mesh.deformation.is_some();
+        if !scene.meshes.iter().any(is_bent) {
+            return Shapes::default();
+        }
+        let mut numbers = 0..;
+        let rows = scene.meshes.iter().map(|mesh| is_bent(mesh).then(|| numbers.next()).flatten());
+        let rows: Arc<[Option<u32>]> = rows.collect();
+        let bends = bends(scene, time_s);
+        let made = bends.iter().map(|_| OnceLock::new()).collect();
+        Shapes { bends, rows, made }
+    }
+
+    /// Moves them to another time.
+    pub fn set_time(&mut self, scene: &Scene, time_s: f64) {
+        if !self.bends.is_empty() {
+            self.bends = bends(scene, time_s);
+            self.made = self.bends.iter().map(|_| OnceLock::new()).collect();
+        }
+    }
+
+    /// Whether all are bent alike.
+    pub fn are_alike(&self, other: &Shapes) -> bool {
+        self.bends == other.bends
+    }
+
+    /// The shape of a mesh, if it deforms.
+    #[inline]
+    pub fn of(&self, scene: &Scene, mesh: u32) -> Option<&Shape> {
+        if self.bends.is_empty() {
             return None;
         }
-        let shapes = self.0.get_or_init(|| {
-            // Not in parallel: a thread of a pool that waits in here could take up work that asks for the same shapes.
-            let mut bends = bends.iter();
-            let shape = |mesh: &Mesh| {
-                let deformation = mesh.deformation.as_ref()?;
-                Some(Arc::new(deformation.shape(bends.next()?, &mesh.triangles)))
-            };
-            scene.meshes.iter().map(shape).collect()
-        });
-        shapes.get(mesh as usize)?.as_deref()
+        let row = self.rows[mesh as usize]? as usize;
+        let mesh = &scene.meshes[mesh as usize];
+        let deformation = mesh.deformation.as_ref()?;
+        // Not in parallel: a thread of a pool that waits in here could take up work that asks for the same shape.
+        Some(self.made[row].get_or_init(|| deformation.shape(&self.bends[row], &mesh.triangles)))
     }
 }
 
-/// How far the meshes of a scene that deform are bent at a time, in the order of the meshes.
-pub(super) fn bends(scene: &Scene, time_s: f64) -> Vec<Bend> {
+/// How far the meshes of a scene that deform are bent at a time, in the order of the meshes. Joints are found once for
+/// all meshes that share them.
+fn bends(scene: &Scene, time_s: f64) -> Vec<Bend> {
+    let mut found: Vec<(*const Skeleton, Arc<[DAffine3]>)> = Vec::new();
+    let mut joints = |skin: &Skin| {
+        let skeleton = Arc::as_ptr(&skin.skeleton);
+        let known = found.iter().rev().find(|(other, _)| std::ptr::eq(*other, skeleton));
+        known.map(|(_, joints)| joints.clone()).unwrap_or_else(|| {
+            let joints: Arc<[DAffine3]> = skin.skeleton.at(time_s, scene.timeline).into();
+            found.push((skeleton, joints.clone()));
+            joints
+        })
+    };
     let deformations = scene.meshes.iter().filter_map(|mesh| mesh.deformation.as_ref());
-    deformations.map(|deformation| deformation.bend(time_s, scene.timeline)).collect()
+    let bend = |deformation: &Arc<Deformation>| {
+        let joints = deformation.skin.as_ref().map_or_else(|| Arc::from([]), &mut joints);
+        deformation.bend(time_s, scene.timeline, joints)
+    };
+    deformations.map(bend).collect()
+}
+
+impl Mesh {
+    /// Makes normals and tangents [unit vectors](Shape::make_unit).
+    pub fn make_unit(&mut self) {
+        let mut shape = Shape::take(self);
+        shape.make_unit(&self.triangles);
+        shape.put(self);
+    }
 }
 
 #[cfg(test)]
@@ -291,7 +345,7 @@ mod tests {
         let positions = vec![Vec3::splat(1e19), Vec3::Z];
         let targets = vec![Target { positions, ..Target::default() }];
         let weights = |value| {
-            vec![Keys {
+            [Keys {
                 times_s: vec![0.0],
                 values: vec![Vec3::splat(value)],
                 interpolation: Default::default(),
@@ -299,8 +353,10 @@ mod tests {
         };
         let shape = |value| {
             let (rest, targets) = (rest.clone(), targets.clone());
-            let bent = Deformation { rest, targets, weights: weights(value), skin: None };
-            bent.shape(&bent.bend(0.0, Timeline::default()), &[]).positions
+            let weights = weights(value).into();
+            let bent = Deformation { rest, targets, weights, skin: None };
+            let bend = bent.bend(0.0, Timeline::default(), Arc::from([]));
+            bent.shape(&bend, &[]).positions
         };
         assert_eq!(shape(1.0), [Vec3::X, Vec3::Y + Vec3::Z]);
         assert_eq!(shape(f32::INFINITY), [Vec3::X, Vec3::Y]);

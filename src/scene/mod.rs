@@ -45,7 +45,7 @@ mod values;
 mod visibility;
 
 pub use camera::{Camera, Projection};
-pub use deformation::{Bend, Deformation, FARTHEST_M, Shape, Skeleton, Skin, Target, is_near};
+pub use deformation::{Deformation, FARTHEST_M, Shape, Skeleton, Skin, Target, is_near};
 pub use ies_profile::{IesProfile, IesTable, LitCone, Pole};
 pub use light::{Light, LightKind, Shaping};
 pub use linking::{LinkRows, Linking, Links, Membership};
@@ -121,7 +121,7 @@ impl Scene {
         nodes.all(|node| one.world(node) == other.world(node))
             && lights().all(|(row, _)| one.light_rgb(row) == other.light_rgb(row))
             && one.instance_rgb == other.instance_rgb
-            && one.bends == other.bends
+            && one.shapes.are_alike(&other.shapes)
     }
 
     /// Whether any light but those at infinity moves, or varies in strength.

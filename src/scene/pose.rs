@@ -2,7 +2,7 @@
 //!
 //! A key counts as at a frame's time if it is [meant to be](Timeline::is_same).
 
-use super::deformation::{Bend, Shape, Shapes, bends};
+use super::deformation::{Shape, Shapes};
 use super::{Scene, Timeline};
 use crate::math::built_in;
 use crate::math::color::Rgb;
@@ -80,8 +80,7 @@ pub struct Pose {
     pub(super) light_rgb: Vec<Option<Rgb>>,
     /// By row of [`Scene::instances`]; empty if none has keys.
     pub(super) instance_rgb: Vec<Option<Rgb>>,
-    /// How far meshes are bent, in the order of those that deform; empty if none does.
-    pub(super) bends: Vec<Bend>,
+    /// Of the meshes that deform.
     pub(super) shapes: Shapes,
 }
 
@@ -106,8 +105,7 @@ impl Pose {
             world: exact.iter().map(DAffine3::as_affine3a).collect(),
             light_rgb: values_at(lights, at),
             instance_rgb: values_at(instances, at),
-            bends: bends(scene, time_s),
-            shapes: Shapes::default(),
+            shapes: Shapes::at(scene, time_s),
         };
         (pose, exact)
     }
@@ -134,7 +132,7 @@ impl Pose {
     /// The shape of a mesh, if it deforms. The scene must be the one that was posed.
     #[inline]
     pub fn shape(&self, scene: &Scene, mesh: u32) -> Option<&Shape> {
-        self.shapes.of(scene, &self.bends, mesh).filter(|_| built_in::MOTION)
+        self.shapes.of(scene, mesh).filter(|_| built_in::MOTION)
     }
 
     /// The positions of a mesh, which may deform, in its own space, metres.

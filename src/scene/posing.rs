@@ -1,7 +1,6 @@
 //! Many poses of one scene, one after the other: what stands still is evaluated once.
 
 use super::Scene;
-use super::deformation::{Shapes, bends};
 use super::pose::{Instant, Keys, Pose, moving};
 use glam::DAffine3;
 
@@ -17,8 +16,6 @@ pub struct Posing<'a> {
     lights: Vec<usize>,
     /// Rows of instances that vary.
     instances: Vec<usize>,
-    /// Whether any mesh deforms.
-    deforms: bool,
 }
 
 impl<'a> Posing<'a> {
@@ -36,7 +33,6 @@ impl<'a> Posing<'a> {
             moving: rows(&mut moving(&scene.nodes).into_iter()),
             lights: rows(&mut scene.lights.iter().map(|light| varies(&light.values))),
             instances: rows(&mut scene.instances.iter().map(|row| varies(&row.values))),
-            deforms: scene.meshes.iter().any(|mesh| mesh.deformation.is_some()),
         }
     }
 
@@ -58,10 +54,7 @@ impl<'a> Posing<'a> {
             let values = scene.instances[row].values.as_ref();
             pose.instance_rgb[row] = values.map(|keys| keys.vector_at(at).as_vec3());
         }
-        if self.deforms {
-            pose.bends = bends(scene, at.time_s);
-            pose.shapes = Shapes::default();
-        }
+        pose.shapes.set_time(scene, at.time_s);
         pose
     }
 }

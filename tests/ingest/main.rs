@@ -3,6 +3,7 @@
 mod cameras;
 mod coat;
 mod corpus;
+mod deforming;
 mod files;
 mod fog;
 mod glass;

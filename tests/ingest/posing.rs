@@ -1,4 +1,4 @@
-//! Skins and morph targets: meshes in the shape of the first frame.
+//! Skins and morph targets: meshes in the shape of the first frame. What changes later is in `deforming`.
 
 use crate::files::{File, lamp};
 use candelabra::scene::{Category, Mesh, Scene};
@@ -76,8 +76,9 @@ pub fn load(file: &File) -> Scene {
 /// Where the vertices of an instance are at a time.
 pub fn places(scene: &Scene, instance: usize, time_s: f64) -> Vec<Vec3> {
     let instance = &scene.instances[instance];
-    let world = scene.pose_at(time_s).world(instance.node);
-    let positions = &scene.meshes[instance.mesh as usize].positions;
+    let pose = scene.pose_at(time_s);
+    let world = pose.world(instance.node);
+    let positions = pose.positions(scene, instance.mesh);
     let in_world =
         |&place: &Vec3| (scene.origin + world.transform_point3(place).as_dvec3()).as_vec3();
     positions.iter().map(in_world).collect()
@@ -123,7 +124,7 @@ pub fn shaded() -> File {
 }
 
 /// A bar from 0 to 2 along x; its right half hangs on a joint at 1 that is bent to the left by 90 degrees.
-fn bar() -> File {
+pub fn bar() -> File {
     let mut file = lamp();
     let rows = (0..6).flat_map(|i| [(i % 3) as f32, (i / 3) as f32 * 0.25, 0.0]);
     let positions = file.floats(&rows.collect::<Vec<f32>>(), "VEC3");

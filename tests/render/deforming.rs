@@ -16,9 +16,9 @@ const SIZE: u32 = 32;
 const WAY: Vec3 = Vec3::new(0.5, 0.25, -0.125);
 
 /// From 0 to 1 in a second, and on to 0.5 in the next.
-fn one_weight() -> Vec<Keys<Vec3>> {
+fn one_weight() -> Arc<[Keys<Vec3>]> {
     let values = [0.0, 1.0, 0.5].map(|weight| Vec3::new(weight, 0.0, 0.0)).into();
-    vec![Keys { times_s: vec![0.0, 1.0, 2.0], values, interpolation: Interpolation::Linear }]
+    [Keys { times_s: vec![0.0, 1.0, 2.0], values, interpolation: Interpolation::Linear }].into()
 }
 
 fn shape_of(mesh: &Mesh) -> Shape {
@@ -91,7 +91,7 @@ fn joints_bend_a_mesh_at_every_time() {
         interpolation: Interpolation::Linear,
     };
     let inner = Node::fixed("", None, at(DVec3::X));
-    let mut outer = Node::fixed("", Some(0), at(DVec3::X));
+    let mut outer = Node::fixed("", None, at(DVec3::X));
     outer.channels = vec![Channel::Rotation(turn)];
     let joints = vec![
         Some((0, DAffine3::from_translation(-DVec3::X))),
@@ -110,11 +110,12 @@ fn joints_bend_a_mesh_at_every_time() {
         influences.extend(of(place));
         ends.push(influences.len() as u32);
     }
-    let skeleton = Arc::new(Skeleton { nodes: vec![inner, outer], joints });
+    let nodes = vec![(None, Arc::new(inner)), (Some(0), Arc::new(outer))];
+    let skeleton = Arc::new(Skeleton { nodes, joints });
     let rest =
         Shape { normals: vec![Vec3::Z; 8], positions: positions.clone(), ..Shape::default() };
     let skin = Some(Skin { skeleton, ends, influences });
-    let (targets, weights) = (Vec::new(), Vec::new());
+    let (targets, weights) = (Vec::new(), Arc::from([]));
     let deformation = Some(Arc::new(Deformation { rest, targets, weights, skin }));
     let triangles =
         (0..3).flat_map(|i| [[2 * i, 2 * i + 2, 2 * i + 3], [2 * i, 2 * i + 3, 2 * i + 1]]);
@@ -221,7 +222,9 @@ fn keys_of_geometry_tell_shapes_apart() {
     let mut faster = pair(true);
     let mesh = &mut faster.scene.meshes[1];
     let mut deformation = Deformation::clone(mesh.deformation.as_ref().unwrap());
-    deformation.weights[0].times_s[1] = 0.5;
+    let mut keys = deformation.weights[0].clone();
+    keys.times_s[1] = 0.5;
+    deformation.weights = [keys].into();
     mesh.deformation = Some(Arc::new(deformation));
     let mut farther = pair(true);
     morph(&mut farther.scene.meshes[1], |_| 2.0 * WAY);

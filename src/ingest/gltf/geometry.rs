@@ -8,7 +8,7 @@ use super::materials::{Materials, uv_sets};
 use super::posing::{Arrays, Hung, Pose, Posed, Poses};
 use super::{Output, Source};
 use crate::ingest::error::Fault;
-use crate::scene::{Category, Mesh, Shape};
+use crate::scene::{Category, Mesh};
 use glam::{Vec2, Vec3, Vec4};
 use gltf::json::mesh::{Mode, Primitive, Semantic};
 use gltf::json::validation::Checked;
@@ -36,6 +36,8 @@ pub(super) struct Compiled {
     pub mesh: u32,
     /// Where it hangs; else at its node.
     pub hung: Option<Hung>,
+    /// It would deform, but keeps the shape of the first frame.
+    pub is_held: bool,
 }
 
 /// Vertices of a primitive that its triangles use.
@@ -72,10 +74,10 @@ impl Meshes {
                 _ => format!("{object}, primitive {i}"),
             };
             let mesh = self.compile(source, output, primitive, (poses, pose), &object)?;
-            compiled.push(mesh.map(|(mesh, hung)| {
+            compiled.push(mesh.map(|(mesh, hung, is_held)| {
                 let name = row.name.clone().unwrap_or(object);
                 output.scene.meshes.push(Mesh { name, ..mesh });
-                Compiled { mesh: output.scene.meshes.len() as u32 - 1, hung }
+                Compiled { mesh: output.scene.meshes.len() as u32 - 1, hung, is_held }
             }));
         }
         let all = first..output.scene.meshes.len();
@@ -115,7 +117,7 @@ impl Meshes {
         primitive: &Primitive,
         (poses, pose): (&Poses, &Pose),
         object: &str,
-    ) -> Result<Option<(Mesh, Option<Hung>)>, Fault> {
+    ) -> Result<Option<(Mesh, Option<Hung>, bool)>, Fault> {
         let category = category(source, primitive);
         let Checked::Valid(mode @ (Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan)) =
             primitive.mode
@@ -208,11 +210,10 @@ impl Meshes {
         }
         let arrays =
             Arrays { attributes: &attributes, vertices: &vertices, positions: positions.count };
-        let Posed { hung, mut deformation } =
-            poses.apply(source, output, (pose, &arrays), &mut mesh, object)?;
-        let mut shape = Shape::take(&mut mesh);
-        shape.make_unit(&mesh.triangles);
-        shape.put(&mut mesh);
+        let posed =
+            poses.apply(source, output, (pose, &arrays), (&mut mesh, look.emits()), object)?;
+        let Posed { hung, is_held, mut deformation } = posed;
+        mesh.make_unit();
         // A mesh with tangents of no length has none that mean anything.
         if mesh.tangents.iter().any(|tangent| tangent.truncate() == Vec3::ZERO) {
             let text = "has tangents without a direction; derived from its texture set";
@@ -248,7 +249,7 @@ impl Meshes {
                 }
             };
         }
-        Ok(Some((mesh, hung)))
+        Ok(Some((mesh, hung, is_held)))
     }
 }
 

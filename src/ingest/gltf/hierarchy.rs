@@ -263,7 +263,7 @@ impl Walk<'_> {
         let mesh_number = mesh.value();
         let row = &self.source.document.meshes[mesh_number];
         for (i, compiled) in compiled.iter().enumerate() {
-            let Some(Compiled { mesh, hung }) = *compiled else { continue };
+            let Some(Compiled { mesh, hung, is_held }) = *compiled else { continue };
             let above = output.scene.nodes[node as usize].path.clone();
             // A lone mesh is the node's prim; several, or one beside a light, are below it.
             let own = usd_path(&row.primitives[i].extras);
@@ -286,6 +286,9 @@ impl Walk<'_> {
             let above = links.membership;
             let membership = self.links.of_primitive(output, primitive, above, placed.object)?;
             self.links.add_instance(output, Links { membership, ..links })?;
+            if is_held {
+                output.notes.add(Category::Animation, &*path, posing::KEEPS_SHAPE);
+            }
             if let Some(hung) = hung {
                 let bytes = size_of::<Hanging>() as u64;
                 output.budget.take(bytes, || placed.object.to_string())?;

@@ -25,7 +25,7 @@ use super::error::Fault;
 use super::notes::Notes;
 use super::paths::{PrimPaths, component};
 use super::uri::Folder;
-use crate::scene::{Category, Instance, Material, Mesh, Node, Scene, Shape, Trs, Visibility};
+use crate::scene::{Category, Instance, Material, Mesh, Node, Scene, Trs, Visibility};
 use glam::{Vec2, Vec3};
 use library::Library;
 use materials::Materials;
@@ -161,9 +161,7 @@ fn compile(
     if has_all(|vertex| vertex.normal) {
         let normal = |v: &Corner| finite(model.normals[v.normal as usize]);
         mesh.normals = vertices.iter().map(normal).collect();
-        let mut shape = Shape::take(&mut mesh);
-        shape.make_unit(&mesh.triangles);
-        shape.put(&mut mesh);
+        mesh.make_unit();
     }
     let color = |v: &Corner| model.colors[v.position as usize];
     if !model.colors.is_empty() && vertices.iter().all(|v| color(v).is_finite()) {

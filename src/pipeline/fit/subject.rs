@@ -39,13 +39,20 @@ pub(super) struct Subject {
 impl Subject {
     /// Finds the subject of a scene.
     pub fn of(scene: &Scene) -> Subject {
-        let outlines: Vec<Outline> = scene.meshes.iter().map(Outline::of).collect();
+        let at_rest = |mesh: &Mesh| Outline::of(mesh, &mesh.positions);
+        let outlines: Vec<Outline> = scene.meshes.iter().map(at_rest).collect();
         let moments = moments(scene);
+        // The box of what deforms is that of its shape at each moment.
+        let outline_in = |pose: &Pose, mesh: u32| {
+            let shape = pose.shape(scene, mesh);
+            shape.map(|shape| Outline::of(&scene.meshes[mesh as usize], &shape.positions))
+        };
         let mut boxes = vec![Aabb::EMPTY; scene.instances.len()];
         let mut lamps = vec![Aabb::EMPTY; scene.lights.len()];
         each_pose(scene, &moments, |pose| {
             for (instance, bounds) in scene.instances.iter().zip(&mut boxes) {
-                let outline = &outlines[instance.mesh as usize];
+                let own = outline_in(pose, instance.mesh);
+                let outline = own.as_ref().unwrap_or(&outlines[instance.mesh as usize]);
                 if !outline.bounds.is_empty() {
                     let placed = outline.bounds.transformed(&pose.world(instance.node));
                     *bounds = bounds.union(&placed);
@@ -63,7 +70,8 @@ impl Subject {
         let mut points: Vec<DVec3> = lamps.iter().flat_map(corners).collect();
         let chosen =
             || (0..).zip(&shown).filter(|(_, shown)| **shown).map(|(row, _): (usize, _)| row);
-        let outline_of = |row: usize| &outlines[scene.instances[row].mesh as usize].points;
+        let outline_of =
+            |row: usize| outlines[scene.instances[row].mesh as usize].points.as_slice();
         let count: usize = chosen().map(|row| outline_of(row).len()).sum();
         if count * moments.len() > MOST_POINTS {
             let all = chosen().fold(Aabb::EMPTY, |all, row| all.union(&boxes[row]));
@@ -72,7 +80,9 @@ impl Subject {
             each_pose(scene, &moments, |pose| {
                 for row in chosen() {
                     let world = pose.world(scene.instances[row].node);
-                    let placed = outline_of(row).iter().map(|&point| world.transform_point3(point));
+                    let own = outline_in(pose, scene.instances[row].mesh);
+                    let outline = own.as_ref().map_or(outline_of(row), |own| &own.points);
+                    let placed = outline.iter().map(|&point| world.transform_point3(point));
                     points.extend(placed.map(|point| point.as_dvec3()));
                 }
             });
@@ -209,7 +219,7 @@ fn is_backdrop(scene: &Scene, pose: &Pose, row: usize, bounds: &Aabb, inside: &A
         return true;
     }
     let instance = &scene.instances[row];
-    let positions = &scene.meshes[instance.mesh as usize].positions;
+    let positions = pose.positions(scene, instance.mesh);
     let world = pose.world(instance.node);
     let margin = Vec3::splat(size(inside));
     let near = Aabb { min: inside.min - margin, max: inside.max + margin };
@@ -251,11 +261,12 @@ struct Outline {
 }
 
 impl Outline {
-    fn of(mesh: &Mesh) -> Outline {
+    /// Of a mesh with some positions.
+    fn of(mesh: &Mesh, positions: &[Vec3]) -> Outline {
         let corners = mesh.triangles.as_flattened();
         let stride = corners.len().div_ceil(MOST_CORNERS).max(1);
         let seen: Vec<Vec3> =
-            corners.iter().step_by(stride).map(|&corner| mesh.positions[corner as usize]).collect();
+            corners.iter().step_by(stride).map(|&corner| positions[corner as usize]).collect();
         if seen.is_empty() {
             return Outline { bounds: Aabb::EMPTY, points: Vec::new() };
         }
@@ -309,7 +320,8 @@ fn fog_corners(scene: &Scene) -> Vec<DVec3> {
 /// Moments that are spread over the whole of the scene's own frames, in seconds; one if nothing moves.
 fn moments(scene: &Scene) -> Vec<f64> {
     let frames = frames_of(scene);
-    let moves = scene.nodes.iter().any(|node| !node.channels.is_empty());
+    let deforms = scene.meshes.iter().any(|mesh| mesh.deformation.is_some());
+    let moves = deforms || scene.nodes.iter().any(|node| !node.channels.is_empty());
     let count = if moves { frames.len().min(MOST_MOMENTS) } else { 1 };
     let frame = |i: usize| frames[i * (frames.len() - 1) / (count - 1).max(1)];
     (0..count).map(|i| scene.timeline.seconds_at(f64::from(frame(i)))).collect()

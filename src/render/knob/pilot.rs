@@ -268,7 +268,7 @@ mod tests {
     fn a_frame_seldom_has_more_noise_than_its_pilot_expects() {
         const DRAWS: u32 = 1000;
         const MEAN: f64 = 0.02 + 0.98 * 1e-3;
-        let error = |number: u32| if hash(SEED, number) % 50 == 0 { 1.0 } else { 1e-3 };
+        let error = |number: u32| if hash(SEED, number).is_multiple_of(50) { 1.0 } else { 1e-3 };
         let pixels = |draw: u32| (160 * draw..160 * (draw + 1)).map(error).collect::<Vec<f64>>();
         let (mut naive, mut short) = (0, 0);
         for draw in 0..DRAWS {

@@ -69,6 +69,8 @@ pub fn prefetch<T>(items: &[T], at: u32) {
             unsafe { _mm_prefetch::<_MM_HINT_T0>(address) };
         }
     }
+    #[cfg(not(target_arch = "x86_64"))]
+    let _ = (items, at);
 }
 
 /// Two registers of four.

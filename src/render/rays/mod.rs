@@ -4,7 +4,7 @@
 //! that stands still, one local-space set for each mesh that moves or is shared by so many
 //! instances that copies would cost memory, and a small tree over the placed meshes and the sphere lights
 //! that stand still. [`Tracer`] is one time of it: another such tree over those that move, built for a [`Pose`], with
-//! a world-space set for each mesh that deforms.
+//! a set for each mesh that deforms.
 //!
 //! What callers may rely on:
 //!
@@ -95,7 +95,7 @@ impl RayScene {
                 let rows = if moves[instance.node as usize] { &mut moving } else { &mut standing };
                 rows.instances.push((number, set));
             } else if scene.deforms(number) {
-                moving.deforming.push(number);
+                moving.deforming.entry(instance.mesh).or_default().push(number);
             } else {
                 flat.push(number);
             }
@@ -106,11 +106,6 @@ impl RayScene {
                 rows.spheres.push(row);
             }
         }
-        let local = |&mesh: &u32| {
-            let mesh = &scene.meshes[mesh as usize];
-            let (triangles, ids) = in_space(mesh, &mesh.positions, 0, DAffine3::IDENTITY);
-            Blas::build(&triangles, &ids)
-        };
         let parts: Vec<_> = flat.par_iter().map(|&i| in_world(scene, pose, i)).collect();
         let shining = flat.iter().zip(&parts).filter(|(row, _)| may_shine(scene, **row));
         let shining = shining.map(|(_, (triangles, _))| triangles.as_slice()).collect::<Vec<_>>();
@@ -118,7 +113,8 @@ impl RayScene {
         let triangles = parts.iter().flat_map(|part| &part.0).copied().collect::<Vec<_>>();
         let ids = parts.iter().flat_map(|part| &part.1).copied().collect::<Vec<_>>();
         drop(parts);
-        let shared: Vec<Blas> = meshes.par_iter().map(local).collect();
+        let own = |&mesh: &u32| in_own_space(scene, pose, mesh);
+        let shared: Vec<Blas> = meshes.par_iter().map(own).collect();
         RayScene {
             fixed: Blas::build(&triangles, &ids),
             shining,
@@ -191,6 +187,14 @@ fn in_space(
     let triangles = mesh.triangles.iter().map(corners).collect();
     let ids = (0..mesh.triangles.len() as u32).map(|triangle| TriangleId { instance, triangle });
     (triangles, ids.collect())
+}
+
+/// The set of a mesh in its own space.
+fn in_own_space(scene: &Scene, pose: &Pose, mesh: u32) -> Blas {
+    let positions = pose.positions(scene, mesh);
+    let mesh = &scene.meshes[mesh as usize];
+    let (triangles, ids) = in_space(mesh, positions, 0, DAffine3::IDENTITY);
+    Blas::build(&triangles, &ids)
 }
 
 /// The triangles of an instance in world space.

@@ -7,19 +7,20 @@ use super::meeting::Space;
 use super::shining::Shining;
 use super::sphere::Sphere;
 use super::wide_bvh::{NONE, WideBvh};
-use super::{in_world, may_shine, world_of};
+use super::{in_own_space, in_world, may_shine, world_of};
 use crate::bounds::Aabb;
 use crate::scene::{LightKind, Pose, Scene};
 use glam::{DAffine3, DVec3, Vec3};
 use rayon::prelude::*;
+use std::collections::BTreeMap;
 
 /// What is to be placed.
 #[derive(Debug, Default)]
 pub(super) struct Rows {
     /// Instances, and the set of triangles that each refers to.
     pub instances: Vec<(u32, u32)>,
-    /// Instances that change their shape.
-    pub deforming: Vec<u32>,
+    /// Of each mesh that changes its shape, its instances.
+    pub deforming: BTreeMap<u32, Vec<u32>>,
     /// Rows of [`Scene::lights`]: spheres.
     pub spheres: Vec<u32>,
 }
@@ -32,6 +33,17 @@ pub(super) struct Placing {
     pub shining: Shining,
     /// What the leaves of the tree are.
     pub items: Vec<Item>,
+    /// Sets in local space, of meshes that deform and have several instances.
+    pub shaped: Vec<Blas>,
+}
+
+/// A set in local space.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Set {
+    /// A row of those that are shared by all poses.
+    Shared(u32),
+    /// A row of [`Placing::shaped`].
+    Shaped(u32),
 }
 
 #[derive(Debug)]
@@ -39,8 +51,7 @@ pub(super) enum Item {
     Sphere(Sphere),
     Mesh {
         instance: u32,
-        /// A row of the shared sets.
-        set: u32,
+        set: Set,
         space: Space,
     },
     /// A mesh in world space: one that deforms, or one that its transform makes flat, which has no local space to
@@ -61,12 +72,27 @@ impl Placing {
             let bounds = set.bounds();
             (Item::InWorld { set }, bounds)
         };
-        let own: Vec<_> = rows.deforming.par_iter().map(|&row| (row, in_world(row))).collect();
-        let placed = rows.instances.iter().map(|&(instance, set)| {
+        let (alone, crowds): (Vec<_>, Vec<_>) =
+            rows.deforming.iter().partition(|(_, instances)| instances.len() == 1);
+        let alone: Vec<_> =
+            alone.par_iter().map(|(_, rows)| (rows[0], in_world(rows[0]))).collect();
+        let shaped = crowds.par_iter().map(|(mesh, _)| in_own_space(scene, pose, **mesh));
+        let shaped: Vec<Blas> = shaped.collect();
+        let of_crowd = |(row, (_, instances)): (u32, &(&u32, &Vec<u32>))| {
+            instances.iter().map(move |&instance| (instance, Set::Shaped(row))).collect::<Vec<_>>()
+        };
+        let crowds = (0..).zip(&crowds).flat_map(of_crowd);
+        let shared = rows.instances.iter().map(|&(instance, set)| (instance, Set::Shared(set)));
+        let placed = shared.chain(crowds).map(|(instance, set)| {
             let to_world = world_of(pose, scene.instances[instance as usize].node);
             let to_local = to_world.inverse();
-            let (item, bounds) = if to_local.is_finite() {
-                let bounds = sets[set as usize].bounds();
+            // A ray in a space beyond all bounds would have no direction.
+            let is_sound = to_local.matrix3.to_cols_array().iter().all(|part| part.abs() < 1e30);
+            let (item, bounds) = if to_local.is_finite() && is_sound {
+                let bounds = match set {
+                    Set::Shared(set) => sets[set as usize].bounds(),
+                    Set::Shaped(set) => shaped[set as usize].bounds(),
+                };
                 let bounds = bounds.map(|bounds| transform_box(&bounds, &to_world));
                 (Item::Mesh { instance, set, space: Space { to_world, to_local } }, bounds)
             } else {
@@ -74,7 +100,7 @@ impl Placing {
             };
             (instance, (item, bounds))
         });
-        for (instance, (item, bounds)) in placed.chain(own) {
+        for (instance, (item, bounds)) in placed.chain(alone) {
             if let Some(bounds) = bounds.filter(is_sound) {
                 shining.extend(may_shine(scene, instance).then_some(bounds));
                 boxes.push(bounds);
@@ -95,7 +121,7 @@ impl Placing {
         let mut unordered: Vec<_> = unordered.into_iter().map(Some).collect();
         let order = leaves.iter().map(|leaf| leaf[0]).filter(|&item| item != NONE);
         let items = order.filter_map(|item| unordered[item as usize].take()).collect();
-        Placing { tree, shining: Shining::around(&shining), items }
+        Placing { tree, shining: Shining::around(&shining), items, shaped }
     }
 }
 

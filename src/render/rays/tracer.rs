@@ -2,7 +2,7 @@
 
 use super::blas::search_limit;
 use super::meeting::{Meeting, On};
-use super::placing::{Item, Placing};
+use super::placing::{Item, Placing, Set};
 use super::prim::{Prim, Sender};
 use super::sight::{Passed, Seen, SeenPane, Sight, order_panes};
 use super::triangles::{Ray, barycentric};
@@ -229,7 +229,10 @@ impl<'a> Tracer<'a> {
                     }
                     Item::Mesh { .. } if !built_in::INSTANCES => {}
                     Item::Mesh { instance, set, space } => {
-                        let set = &self.scene.shared[*set as usize];
+                        let set = match set {
+                            Set::Shared(set) => &self.scene.shared[*set as usize],
+                            Set::Shaped(set) => &placing.shaped[*set as usize],
+                        };
                         set.visit::<ORDERED>(&space.localize(ray), tmax, |hit| {
                             tmax = met(&Meeting::with_triangle(&hit.of(*instance), Some(space)));
                             tmax

@@ -36,16 +36,17 @@ use super::document::{label, morph_targets};
 use super::geometry::Vertices;
 use super::{Output, Source};
 use crate::ingest::error::Fault;
-use crate::scene::{Category, Channel, Deformation, Keys, Mesh, Shape};
+use crate::scene::{Category, Channel, Deformation, Mesh, Shape};
 use glam::{Vec3, Vec4};
 use gltf::json::mesh::{Primitive, Semantic};
 use gltf::json::validation::Checked;
 use gltf::json::{Index, Mesh as Row, Node};
 use rig::Rig;
-use std::collections::BTreeMap;
+use skin::How;
+use std::collections::{BTreeMap, HashSet};
 
 /// The text of the note on a mesh light that would change its shape.
-const KEEPS_SHAPE: &str =
+pub(super) const KEEPS_SHAPE: &str =
     "deforms after the first frame; it gives light, and so keeps the shape of the first frame";
 
 /// What poses the meshes of a file.
@@ -80,6 +81,8 @@ pub(super) struct Hung {
 pub(super) struct Posed {
     /// Where it hangs, if joints move it.
     pub hung: Option<Hung>,
+    /// It would change its shape later, but gives light.
+    pub is_held: bool,
     /// How it changes its shape later.
     pub deformation: Option<Deformation>,
 }
@@ -138,7 +141,7 @@ impl Poses {
         source: &Source,
         output: &mut Output,
         (pose, arrays): (&Pose, &Arrays),
-        mesh: &mut Mesh,
+        (mesh, emits): (&mut Mesh, bool),
         object: &str,
     ) -> Result<Posed, Fault> {
         let is_bound = pose.skin.is_some() && is_bound(arrays.attributes.primitive);
@@ -164,7 +167,9 @@ impl Poses {
         }
         let mut bound = None;
         if let Some(skin) = pose.skin.filter(|_| is_bound) {
-            match skin::apply(source, output, (&self.rig, skin), arrays, mesh, object)? {
+            let how = How { emits, is_animated: pose.animated.is_some() };
+            let skin = (&self.rig, skin);
+            match skin::apply(source, output, skin, arrays, (mesh, how), object)? {
                 Ok(joints) => bound = Some(joints),
                 Err(problem) => {
                     let text = format!("{problem}; drawn in its rest pose");
@@ -176,34 +181,30 @@ impl Poses {
         let animated = pose.animated.filter(|_| !targets.is_empty());
         let deforms = animated.is_some() || hung.is_some_and(|hung| hung.deforms);
         let weights = match animated {
-            Some(node) => {
-                let keys = &self.weights[&node].keys;
-                let bytes =
-                    |keys: &Keys<_>| size_of_val(&*keys.times_s) + size_of_val(&*keys.values);
-                let bytes: usize = keys.iter().map(bytes).sum();
-                output.budget.take(bytes as u64, || object.to_string())?;
-                keys.clone()
-            }
+            Some(node) => self.weights[&node].keys.clone(),
             None => weights::constant(&weights),
         };
         let skin = bound.map(|bound| bound.skin);
-        let deformation = deforms.then_some(Deformation { rest, targets, weights, skin });
-        Ok(Posed { hung, deformation })
+        let is_held = deforms && emits;
+        let how = || Deformation { rest, targets, weights, skin };
+        let deformation = (deforms && !emits).then(how);
+        Ok(Posed { hung, is_held, deformation })
     }
 }
 
-/// Lets only meshes deform that give no light.
+/// Lets only meshes deform that give no light: also those whose instances say that they do.
 pub(super) fn settle(output: &mut Output) {
     let scene = &mut output.scene;
     let deforms = |mesh: u32| scene.meshes[mesh as usize].deformation.is_some();
     let shines = |row: u32| scene.peak_rgb_of_instance(row).max_element() > 0.0;
     let rows = (0..).zip(&scene.instances).filter(|(_, instance)| deforms(instance.mesh));
-    let lit: Vec<usize> =
-        rows.filter(|&(row, _)| shines(row)).map(|(row, _)| row as usize).collect();
-    for row in lit {
-        let instance = &scene.instances[row];
-        scene.meshes[instance.mesh as usize].deformation = None;
+    let lit: HashSet<u32> =
+        rows.filter(|&(row, _)| shines(row)).map(|(_, instance)| instance.mesh).collect();
+    for instance in scene.instances.iter().filter(|instance| lit.contains(&instance.mesh)) {
         output.notes.add(Category::Animation, &*instance.path, KEEPS_SHAPE);
+    }
+    for mesh in lit {
+        scene.meshes[mesh as usize].deformation = None;
     }
 }
 

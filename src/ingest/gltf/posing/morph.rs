@@ -31,15 +31,16 @@ pub(super) fn apply(
     let read = (0..count).filter(|&target| is_read(target)).count();
     let bytes = BYTES * (read as u64 + 2) * mesh.positions.len() as u64;
     output.budget.take(bytes, || object.to_string())?;
+    let used = used(mesh, mesh.positions.len());
     let target = |target: usize| match is_read(target) {
-        true => read_target(arrays, target, mesh),
+        true => read_target(arrays, target, (mesh, &used)),
         false => Ok(Target::default()),
     };
     let targets = match (0..count).map(target).collect::<Result<Vec<Target>, String>>() {
         Ok(targets) => targets,
         Err(problem) => return Ok(Err(problem)),
     };
-    if let Err(problem) = moved(&targets, weights, mesh) {
+    if let Err(problem) = moved(&targets, weights, (mesh, &used)) {
         return Ok(Err(problem));
     }
     if arrays.attributes.targets_color() {
@@ -49,7 +50,12 @@ pub(super) fn apply(
     Ok(Ok(targets))
 }
 
-fn read_target(arrays: &Arrays, target: usize, mesh: &Mesh) -> Result<Target, String> {
+/// Vertices that no triangle uses are not displaced.
+fn read_target(
+    arrays: &Arrays,
+    target: usize,
+    (mesh, used): (&Mesh, &[bool]),
+) -> Result<Target, String> {
     let by = |semantic: Semantic, is_wanted: bool| {
         if !is_wanted {
             return Ok(Vec::new());
@@ -58,28 +64,28 @@ fn read_target(arrays: &Arrays, target: usize, mesh: &Mesh) -> Result<Target, St
         let read = |accessor| arrays.vertices.read(accessor, 0.0, Vec3::from_array);
         Ok::<_, String>(found.map(read).unwrap_or_default())
     };
+    let mut positions = by(Semantic::Positions, true)?;
+    let moves = positions.iter_mut().zip(used);
+    moves.filter(|(_, used)| !**used).for_each(|(by, _)| *by = Vec3::ZERO);
     Ok(Target {
-        positions: by(Semantic::Positions, true)?,
+        positions,
         normals: by(Semantic::Normals, !mesh.normals.is_empty())?,
         tangents: by(Semantic::Tangents, !mesh.tangents.is_empty())?,
     })
 }
 
-fn moved(targets: &[Target], weights: &[f32], mesh: &mut Mesh) -> Result<(), String> {
+fn moved(
+    targets: &[Target],
+    weights: &[f32],
+    (mesh, used): (&mut Mesh, &[bool]),
+) -> Result<(), String> {
     let rest = Shape::take(mesh);
     let mut shape = rest.clone();
     for (target, &weight) in targets.iter().zip(weights).filter(|(_, weight)| **weight != 0.0) {
         target.add_to(&mut shape, weight);
     }
-    let mut is_sound = true;
-    for ((place, rest), used) in
-        shape.positions.iter_mut().zip(&rest.positions).zip(used(mesh, rest.positions.len()))
-    {
-        match used {
-            true => is_sound &= is_near(place.as_dvec3()),
-            false => *place = *rest,
-        }
-    }
+    let mut places = shape.positions.iter().zip(used).filter(|(_, used)| **used);
+    let is_sound = places.all(|(place, _)| is_near(place.as_dvec3()));
     if is_sound { shape } else { rest }.put(mesh);
     if is_sound { Ok(()) } else { Err("its morph targets lead out of all bounds".into()) }
 }

@@ -26,7 +26,7 @@ struct Joint {
     /// How many nodes are above it.
     depth: u32,
     /// How it moves against its parent.
-    node: Node,
+    node: Arc<Node>,
 }
 
 impl Rig {
@@ -58,14 +58,14 @@ impl Rig {
                 let parent = parents[&row];
                 let mut node =
                     Node::fixed("", None, local(&document.beside.transforms[row], |_| {}));
-                let keys = 2 * channels[row].iter().map(byte_length).sum::<u64>();
+                let keys = channels[row].iter().map(byte_length).sum();
                 output.budget.take(keys, || "skins".to_string())?;
                 node.channels = channels[row].clone();
                 node.settle();
                 let joint = Joint {
                     parent,
                     depth: parent.map_or(0, |parent| rig.nodes[&parent].depth + 1),
-                    node,
+                    node: Arc::new(node),
                 };
                 rig.nodes.insert(row, joint);
             }
@@ -109,16 +109,15 @@ impl Rig {
         self.path(node, against).any(|node| !self.nodes[&node].node.channels.is_empty())
     }
 
-    /// The joints of a skin as they are below a node, or in the world, and how many bytes that takes anew. A joint that
-    /// is not in the scene or not below that node moves nothing.
+    /// The joints of a skin as they are below a node, or in the world. A joint that is not in the scene or not below
+    /// that node moves nothing.
     pub(super) fn skeleton(
         &self,
         (skin, below): Place,
         joints: &[usize],
         inverse_bind: impl Fn(usize) -> DAffine3,
-    ) -> (Arc<Skeleton>, u64) {
+    ) -> Arc<Skeleton> {
         let mut skeletons = self.skeletons.borrow_mut();
-        let mut bytes = 0;
         let skeleton = skeletons.entry((skin, below)).or_insert_with(|| {
             let (mut nodes, mut numbers) = (Vec::new(), HashMap::new());
             let joint = |(number, &joint): (usize, &usize)| {
@@ -128,7 +127,7 @@ impl Rig {
                 }
                 if Some(joint) == below {
                     // The space itself.
-                    nodes.push(Node::fixed("", None, Trs::default()));
+                    nodes.push((None, Arc::new(Node::fixed("", None, Trs::default()))));
                     return Some((nodes.len() as u32 - 1, inverse_bind(number)));
                 }
                 let path: Vec<usize> = self.path(joint, below).collect();
@@ -137,10 +136,7 @@ impl Rig {
                         let parent = self.nodes[&row].parent;
                         let parent = parent.and_then(|parent| numbers.get(&parent).copied());
                         numbers.insert(row, nodes.len() as u32);
-                        let node = &self.nodes[&row].node;
-                        let keys: u64 = node.channels.iter().map(byte_length).sum();
-                        bytes += keys + size_of::<Node>() as u64;
-                        nodes.push(Node { parent, ..node.clone() });
+                        nodes.push((parent, self.nodes[&row].node.clone()));
                     }
                 }
                 Some((numbers[&joint], inverse_bind(number)))
@@ -148,7 +144,7 @@ impl Rig {
             let joints = joints.iter().enumerate().map(joint).collect();
             Arc::new(Skeleton { nodes, joints })
         });
-        (skeleton.clone(), bytes)
+        skeleton.clone()
     }
 }
 

@@ -18,14 +18,21 @@ const JOINT_BYTES: usize = 640;
 /// What a vertex takes beside its influences, while the mesh is moved.
 const VERTEX_BYTES: usize = size_of::<(bool, u32, [Vec3; 2], Vec4)>();
 
+/// What else is known of a mesh that joints move.
+#[derive(Clone, Copy)]
+pub(super) struct How {
+    /// It gives light.
+    pub emits: bool,
+    /// The weights of its morph targets change.
+    pub is_animated: bool,
+}
+
 /// How joints move a mesh.
 pub(super) struct Bound {
     pub hung: Hung,
     pub skin: Skin,
     /// Whether there are vertices without weights.
     has_free: bool,
-    /// What its skeleton takes anew.
-    bytes: u64,
 }
 
 /// Moves a mesh by the joints of a skin; else says what is wrong with that, and leaves the mesh as it was.
@@ -34,7 +41,7 @@ pub(super) fn apply(
     output: &mut Output,
     (rig, skin): (&Rig, usize),
     arrays: &Arrays,
-    mesh: &mut Mesh,
+    (mesh, how): (&mut Mesh, How),
     object: &str,
 ) -> Result<Result<Bound, String>, Fault> {
     let Some(row) = source.document.skins.get(skin) else {
@@ -48,11 +55,10 @@ pub(super) fn apply(
     output.budget.take(bytes, || object.to_string())?;
     let bytes = ((VERTEX_BYTES + 2 * of_influences) * mesh.positions.len()) as u64;
     output.budget.take(bytes, || object.to_string())?;
-    let bound = bind(source, (rig, skin, row), arrays, mesh);
-    let of_skeleton = bound.as_ref().map_or(0, |bound| bound.bytes);
-    output.budget.take(of_skeleton, || object.to_string())?;
+    let How { emits, is_animated } = how;
+    let bound = bind(source, (rig, skin, row), arrays, (mesh, emits));
     let bound = bound.and_then(|bound| bend(mesh, &bound.skin, output).map(|()| bound));
-    if !bound.as_ref().is_ok_and(|bound| bound.hung.deforms) {
+    if !bound.as_ref().is_ok_and(|bound| bound.hung.deforms || is_animated) {
         output.budget.put_back(bytes);
     }
     if bound.as_ref().is_ok_and(|bound| bound.has_free) {
@@ -66,7 +72,7 @@ fn bind(
     source: &Source,
     (rig, number, row): (&Rig, usize, &Row),
     arrays: &Arrays,
-    mesh: &Mesh,
+    (mesh, emits): (&Mesh, bool),
 ) -> Result<Bound, String> {
     let nodes: Vec<usize> = row.joints.iter().map(|joint| joint.value()).collect();
     let inverse_bind = row.inverse_bind_matrices.map(|index| source.accessors.get(index));
@@ -100,9 +106,9 @@ fn bind(
     if moving.iter().any(|&joint| !rig.has(nodes[joint])) {
         return Err("its skin has joints that are not in the scene".into());
     }
-    let hung = hang(rig, &nodes, &moving);
-    let (skeleton, bytes) = rig.skeleton((number, hung.below), &nodes, inverse_bind);
-    Ok(Bound { hung, skin: Skin { skeleton, ends, influences }, has_free, bytes })
+    let hung = hang(rig, &nodes, &moving, emits);
+    let skeleton = rig.skeleton((number, hung.below), &nodes, inverse_bind);
+    Ok(Bound { hung, skin: Skin { skeleton, ends, influences }, has_free })
 }
 
 /// Moves each vertex that joints move, as at the first frame; else says that one goes too far, and moves none.
@@ -136,13 +142,16 @@ fn is_matrices(accessor: &Accessor, joints: usize) -> bool {
         && accessor.count >= joints
 }
 
-/// Where a mesh hangs that some joints of a skin move.
-fn hang(rig: &Rig, nodes: &[usize], moving: &[usize]) -> Hung {
+/// Where a mesh hangs that some joints of a skin move. One that emits goes along with what its joints have in common.
+fn hang(rig: &Rig, nodes: &[usize], moving: &[usize], emits: bool) -> Hung {
     let mut moving = moving.iter().map(|&joint| nodes[joint]);
     let first = moving.clone().next();
     let common = moving.clone().fold(first, |common, joint| rig.meet(common, Some(joint)));
     if !moving.any(|joint| rig.moves(joint, common)) {
         return Hung { below: common, deforms: false };
+    }
+    if emits {
+        return Hung { below: common, deforms: true };
     }
     let skeleton: HashSet<usize> = nodes.iter().copied().collect();
     Hung { below: rig.above(common, &skeleton), deforms: true }

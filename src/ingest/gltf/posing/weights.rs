@@ -4,6 +4,7 @@ use crate::ingest::gltf::accessors::Accessor;
 use crate::ingest::gltf::animation::Track;
 use crate::scene::{Interpolation, Keys, Timeline};
 use glam::Vec3;
+use std::sync::Arc;
 
 /// How far weights may be apart to be one.
 const TOLERANCE: f64 = 1e-6;
@@ -13,7 +14,7 @@ pub(in crate::ingest::gltf) struct Weights {
     /// At the first frame.
     pub first: Vec<f32>,
     /// By threes; empty if they are the same at all times.
-    pub keys: Vec<Keys<Vec3>>,
+    pub keys: Arc<[Keys<Vec3>]>,
 }
 
 impl Weights {
@@ -44,12 +45,12 @@ impl Weights {
         if keys.iter().all(|keys| keys.is_steady(TOLERANCE)) {
             keys.clear();
         }
-        Weights { first, keys }
+        Weights { first, keys: keys.into() }
     }
 }
 
 /// Weights that never change, by threes.
-pub(super) fn constant(weights: &[f32]) -> Vec<Keys<Vec3>> {
+pub(super) fn constant(weights: &[f32]) -> Arc<[Keys<Vec3>]> {
     let keys = |three: &[f32]| {
         let number = |i: usize| three.get(i).copied().unwrap_or(0.0);
         let values = vec![Vec3::new(number(0), number(1), number(2))];
