@@ -11,7 +11,7 @@ from others.pictures import read_exr
 
 SIZE = (64, 64)
 TALL = math.radians(44)
-DEPTH = 24
+DEPTH = 10
 GREY, RED = (0.5, 0.5, 0.5), (0.6, 0.25, 0.2)
 
 

@@ -1,7 +1,8 @@
 """Mitsuba's half of what is compared: meshes as files, materials that speak glTF's formulas, pictures.
 
 `schlick` is a BSDF for Mitsuba that wraps one of its own dielectrics, `dielectric`, `roughdielectric` or
-`thindielectric`, and puts glTF's Fresnel term in place of the exact one; all else is Mitsuba's.
+`thindielectric`, and puts glTF's Fresnel term in place of the exact one. A path ends that passes the triangle but not the
+surface that normals at its corners tell of, or the other way. All else is Mitsuba's.
 """
 
 import drjit as dr
@@ -37,13 +38,19 @@ class Schlick(mi.BSDF):
         ours = dr.select(exact >= 1, 1, ours)
         return dr.select(reflected, ours / exact, dr.select(exact < 1, (1 - ours) / (1 - exact), 0))
 
+    def agrees(self, si, way):
+        """Whether a direction is on the same side of the triangle and of the normal."""
+        return (dr.dot(si.n, si.to_world(way)) > 0) == (way.z > 0)
+
     def sample(self, ctx, si, one, two, active=True):
         drawn, weight = self.nested.sample(ctx, si, one, two, active)
-        return drawn, dr.select(drawn.pdf > 0, weight * self.share(si.wi, drawn.wo), 0)
+        is_sound = (drawn.pdf > 0) & self.agrees(si, si.wi) & self.agrees(si, drawn.wo)
+        return drawn, dr.select(is_sound, weight * self.share(si.wi, drawn.wo), 0)
 
     def eval(self, ctx, si, wo, active=True):
         value = self.nested.eval(ctx, si, wo, active)
-        return dr.select(value != 0, value * self.share(si.wi, wo), 0)
+        is_sound = (value != 0) & self.agrees(si, si.wi) & self.agrees(si, wo)
+        return dr.select(is_sound, value * self.share(si.wi, wo), 0)
 
     def pdf(self, ctx, si, wo, active=True):
         return self.nested.pdf(ctx, si, wo, active)
