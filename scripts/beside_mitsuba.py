@@ -3,7 +3,7 @@
 Small scenes, each written as glTF for `candelabra-render` and built for another renderer, are rendered by both to little
 noise, in 16 independent pictures each. docs/beside_others.md says what is compared, and why what differs does.
 
-    python3 scripts/beside_mitsuba.py candelabra-render [--quick] [--write] [--only NAME]...
+    python3 scripts/beside_mitsuba.py candelabra-render [--samples 128] [--write] [--only NAME]...
 
 Wants `pip install mitsuba bpy numpy`, and for Mitsuba an LLVM of version 19 or later (DRJIT_LIBLLVM_PATH names it, if it
 is not found). `--write` puts the table into the page.
@@ -68,7 +68,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("program", type=lambda path: Path(path).resolve(), help="candelabra-render")
     parser.add_argument("--only", action="append", choices=SCENES, metavar="NAME", help=f"of {', '.join(SCENES)}")
-    parser.add_argument("--quick", action="store_true", help="an eighth of the samples")
+    parser.add_argument("--samples", type=int, default=128, help="of a pixel in each of our pictures")
     parser.add_argument("--write", action="store_true", help="put the table into docs/beside_others.md")
     options = parser.parse_args()
     head = "| scene | beside | ratio of means | red, green, blue | differs beyond noise | blocks, in standard errors: rms | worst |"
@@ -76,14 +76,14 @@ def main():
     print("\n".join(lines), flush=True)
     for name in options.only or SCENES:
         with tempfile.TemporaryDirectory() as folder:
-            for beside, how in rows(name, options.program, 16 if options.quick else 128, folder):
+            for beside, how in rows(name, options.program, options.samples, folder):
                 ratio = f"{how['ratio']:.4f} ± {how['error']:.4f}"
                 colors = ", ".join(f"{part:.4f}" for part in how["channels"])
                 blocks = f"{how['z']:.2f} | {how['worst']:+.1f} ({how['worst_ratio']:.3f})"
                 lines.append(f"| {name} | {beside} | {ratio} | {colors} | {100 * how['rms']:.2f} % | {blocks} |")
                 print(lines[-1], flush=True)
     if options.write:
-        command = f"python3 scripts/beside_mitsuba.py candelabra-render`; {benchmarks.machine()}; {date.today()}"
+        command = f"python3 scripts/beside_mitsuba.py candelabra-render --samples {options.samples}`; {benchmarks.machine()}; {date.today()}"
         benchmarks.write("beside_mitsuba", "\n".join([*lines, "", f"*`{command}.*"]))
 
 

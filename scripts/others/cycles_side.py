@@ -6,7 +6,6 @@ renders a scene that `Plain` reads: a stack of pictures, one for each seed. The 
 other than converged ones (clamping, blurred caustics, a threshold for faint lights, adaptive counts, a denoiser) is off.
 """
 
-import argparse
 import math
 import sys
 import tempfile
@@ -166,19 +165,10 @@ def picture(scene, samples, seed):
 
 
 def main():
-    from others.documents import Plain
+    from others.documents import Plain, asked
 
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("scene")
-    parser.add_argument("output")
-    parser.add_argument("--samples", type=int, default=64)
-    parser.add_argument("--seeds", type=int, nargs="+", default=[0])
-    parser.add_argument("--size", default="160x90")
-    parser.add_argument("--depth", type=int, default=1)
-    parser.add_argument("--threads", type=int, default=1)
-    options = parser.parse_args()
-    size = tuple(map(int, options.size.split("x")))
-    scene = converted(Plain(options.scene), size, options.depth, options.threads)
+    options = asked(__doc__)
+    scene = converted(Plain(options.scene), options.size, options.depth, options.threads)
     np.save(options.output, np.stack([picture(scene, options.samples, seed) for seed in options.seeds]))
 
 

@@ -3,6 +3,7 @@
 Everything is in glTF's own axes, +Y up. Written scenes are matt or of materials that are given as they stand in glTF.
 """
 
+import argparse
 import json
 import math
 import struct
@@ -192,3 +193,16 @@ def local(node):
     matrix[:3, :3] *= node.get("scale", (1, 1, 1))
     matrix[:3, 3] = node.get("translation", (0, 0, 0))
     return matrix
+
+
+def asked(doc):
+    """The options of a program that renders a plain scene by another renderer."""
+    parser = argparse.ArgumentParser(description=doc.splitlines()[0])
+    parser.add_argument("scene")
+    parser.add_argument("output")
+    parser.add_argument("--samples", type=int, default=64)
+    parser.add_argument("--seeds", type=int, nargs="+", default=[0])
+    parser.add_argument("--size", type=lambda text: tuple(map(int, text.split("x"))), default=(160, 90))
+    parser.add_argument("--depth", type=int, default=1)
+    parser.add_argument("--threads", type=int, default=1)
+    return parser.parse_args()

@@ -61,7 +61,7 @@ def lit(booth, place, fine=16):
 
 def bilinear(table, polar, around):
     """A table by half plane and vertical angle, at places in units of its steps."""
-    i, j = (np.minimum(at.astype(int), size - 2) for at, size in zip((around, polar), table.shape))
+    i, j = (np.minimum(at.astype(int), size - 2) for at, size in zip((around, polar), table.shape, strict=True))
     f, g = around - i, polar - j
     low, high = ((1 - g) * table[i + k, j] + g * table[i + k, j + 1] for k in (0, 1))
     return (1 - f) * low + f * high
