@@ -14,8 +14,9 @@ import tempfile
 from datetime import date
 from pathlib import Path
 
-import benchmarks
 import numpy as np
+
+import benchmarks
 from others import mitsuba_side as mitsuba
 from others import scenes_of_surfaces as surfaces
 from others.booth import DEPTH, Booth

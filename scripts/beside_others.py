@@ -27,9 +27,9 @@ import tempfile
 from datetime import date
 from pathlib import Path
 
-import benchmarks
 import numpy as np
 
+import benchmarks
 from others.documents import Plain
 from others.pictures import luminance, read_exr
 
@@ -138,11 +138,9 @@ def main():
     parser.add_argument("--samples", type=int, default=64, help="of a pixel; the converged picture has 8 times as many")
     parser.add_argument("--write", action="store_true", help="put the table into docs/beside_others.md")
     options = parser.parse_args()
-    order = " / ".join(RENDERERS)
-    lines = [
-        f"| scene | relMSE x samples: {order} | microseconds a sample | efficiency over the best rival: default / one light | means, over ours: Cycles / Mitsuba |",
-        "|---|--:|--:|--:|--:|",
-    ]
+    columns = [f"relMSE x samples: {' / '.join(RENDERERS)}", "microseconds a sample"]
+    columns += ["efficiency over the best rival: default / one light", "means, over ours: Cycles / Mitsuba"]
+    lines = [f"| scene | {' | '.join(columns)} |", "|---|--:|--:|--:|--:|"]
     print("\n".join(lines), flush=True)
     for scene in options.scenes:
         path, _, bounces = scene.partition(":")
@@ -154,9 +152,9 @@ def main():
         lines.append(line(name, rows))
         print(lines[-1], flush=True)
         print(f"{name}: {rows}", file=sys.stderr, flush=True)
-    if options.write:
-        command = "python3 scripts/beside_others.py candelabra-render SCENE..."
-        benchmarks.write("beside_others", "\n".join([*lines, "", f"*`{command}`; {benchmarks.machine()}; {date.today()}.*"]))
+        if options.write:
+            command = "python3 scripts/beside_others.py candelabra-render SCENE..."
+            benchmarks.write("beside_others", "\n".join([*lines, "", f"*`{command}`; {benchmarks.machine()}; {date.today()}.*"]))
 
 
 if __name__ == "__main__":

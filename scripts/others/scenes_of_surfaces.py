@@ -162,7 +162,7 @@ def lamp_above(booth):
 
 def lamp_in_front(booth):
     """On the right, out of sight, towards the glass and the walls."""
-    booth.lamp((1.9, 1.6, 1.2), (-0.4, 0, -0.6), (0, 0.5, 0), 8.0)
+    booth.lamp((1.9, 1.6, 1.2), (-0.4, 0, 0.6), (0, 0.5, 0), 8.0)
 
 
 def pane(z=0.0):
