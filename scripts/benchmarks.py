@@ -122,7 +122,7 @@ BLOCKS = {
     "profile": (profile, "python3 scripts/profile.py target/release SCENE..."),
     "what_is_paid": (what_is_paid, "python3 scripts/what_is_paid.py"),
 }
-FILES = ("README.md", "docs/measurements.md", "docs/one_frame.md", "docs/profile.md")
+FILES = ("README.md", "docs/measurements.md", "docs/one_frame.md", "docs/profile.md", "docs/beside_others.md")
 
 
 def machine():
