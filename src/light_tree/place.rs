@@ -77,7 +77,7 @@ impl FrameTree<'_> {
         {
             fields.weigh(self, place, &mut importances);
         }
-        if built_in::INSTANCES {
+        if built_in::INSTANCES && place.unit != 1.0 {
             importances.iter_mut().for_each(|importance| *importance *= place.unit);
         }
         let veils = self.veils.filter(|_| place.viewer.cell() != Cell::NONE).map(|veils| {

@@ -1,7 +1,7 @@
 //! Meshes that change their shape: a frame shows the shape of its time, whoever looks at it.
 
 use crate::rooms;
-use crate::stage::{Set, Stage, at, direct, facing, glow, lambert};
+use crate::stage::{Set, Stage, at, direct, facing, glow, lambert, scaled};
 use candelabra::pipeline;
 use candelabra::render::buffers::RenderBuffers;
 use candelabra::render::{Aov, RenderSettings};
@@ -79,6 +79,34 @@ fn a_frame_shows_the_shape_of_its_time() {
         pictures.push(bits(&render(&frozen(squashed().scene, frame), &settings, 1)));
     }
     assert!(pictures.windows(2).all(|pair| pair[0] != pair[1]));
+}
+
+/// Four of them, one in a mirror and one flat.
+fn crowd() -> Scene {
+    let mut stage = squashed();
+    let mesh = stage.scene.meshes.len() as u32 - 1;
+    for (place, scale) in [
+        (DVec3::new(-0.6, 0.3, 0.1), DVec3::splat(0.5)),
+        (DVec3::new(0.5, 0.2, 0.5), DVec3::new(-0.6, 0.4, 0.8)),
+        (DVec3::new(-0.2, 0.9, 0.0), DVec3::new(0.8, 0.8, 0.0)),
+    ] {
+        let node = stage.node(scaled(at(place), scale));
+        stage.again(mesh, node);
+    }
+    stage.scene
+}
+
+/// Several instances search one set in the mesh's own space; what is flat has a set of its own in the world's.
+#[test]
+fn a_crowd_has_the_shape_of_its_time() {
+    let settings = RenderSettings { depth: 2, ..direct(SIZE, 16) };
+    for frame in [13, 25] {
+        let moving = render(&crowd(), &settings, frame);
+        let still = render(&frozen(crowd(), frame), &settings, frame);
+        let alone = render(&squashed().scene, &settings, frame);
+        assert!(disagree(&moving, &still) <= 16, "frame {frame}: {}", disagree(&moving, &still));
+        assert!(disagree(&moving, &alone) > 100, "the crowd is seen");
+    }
 }
 
 /// A bar of two joints, whose outer one turns; and the same bar, bent by hand.

@@ -218,8 +218,12 @@ impl<'a> Tracer<'a> {
         if tmax < 0.0 {
             return;
         }
+        let placings = [&self.scene.standing, &self.moving];
+        if placings.iter().all(|placing| placing.items.is_empty()) {
+            return;
+        }
         let box_ray = BoxRay::new(ray.origin.as_vec3(), ray.direction.as_vec3());
-        for placing in [&self.scene.standing, &self.moving] {
+        for placing in placings {
             placing.tree.walk::<ORDERED>(&box_ray, search_limit(tmax), |item| {
                 match &placing.items[item as usize] {
                     Item::Sphere(sphere) => {
