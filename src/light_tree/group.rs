@@ -129,7 +129,7 @@ impl Group {
     }
 
     #[inline(always)]
-    fn decode<const ENDLESS: bool, const ROUND: bool>(&self) -> Lanes {
+    fn decode<const ENDLESS: bool>(&self) -> Lanes {
         let half_extent = |axis: usize| {
             each(|lane| {
                 f32::from(self.half_extent[axis][lane]) * node::scale(self.half_exponent[lane])
@@ -143,11 +143,7 @@ impl Group {
             center: self.center,
             half_extent: [half_extent(0), half_extent(1), half_extent(2)],
             axis: [x, y, z],
-            sin_half_theta_o: if ROUND {
-                [1.0; WIDTH]
-            } else {
-                each(|lane| node::decode_sin_half_theta_o(self.theta_o[lane]))
-            },
+            sin_half_theta_o: each(|lane| node::decode_sin_half_theta_o(self.theta_o[lane])),
             cos_theta_e: each(|lane| node::decode_cos_theta_e(self.theta_e[lane])),
             two_sided: each(|lane| u32::from(node::is_two_sided(self.theta_o[lane]))),
             inverse_range2: if ENDLESS {
@@ -202,7 +198,7 @@ impl Group {
         // Each quantity has an array over the lanes, so that the compiler computes all lanes together.
         let (mut products, mut decays, mut spreads) = ([0.0; WIDTH], [0.0; WIDTH], [0.0; WIDTH]);
         let mut sights = Sights::default();
-        let lanes = self.decode::<ENDLESS, ROUND>();
+        let lanes = self.decode::<ENDLESS>();
         for lane in 0..WIDTH {
             let factors = viewer.factors(&lanes.cluster::<ENDLESS, ROUND>(lane));
             (products[lane], decays[lane]) = (factors.product, factors.decay);

@@ -34,7 +34,7 @@ fn places(scene: &Scene) -> Vec<Key> {
             false => still(&pose, at as u32),
             true => {
                 let mut hasher = Hasher::new();
-                let clock = (scene.timeline.zero_frame, scene.timeline.frames_per_second);
+                let clock = clock(scene);
                 hasher.update(format!("{:?} {clock:?} {}", node.local, scene.origin).as_bytes());
                 hasher.update(&node.parent.map_or([0; 32], |parent| places[parent as usize]));
                 node.channels.iter().for_each(|channel| add_channel(&mut hasher, channel));
@@ -43,6 +43,11 @@ fn places(scene: &Scene) -> Vec<Key> {
         });
     }
     places
+}
+
+/// What of the timeline says when a frame is.
+fn clock(scene: &Scene) -> (f64, f64) {
+    (scene.timeline.zero_frame, scene.timeline.frames_per_second)
 }
 
 fn still(pose: &Pose, node: u32) -> Key {
@@ -125,8 +130,7 @@ fn shape(scene: &Scene, mesh: &Mesh) -> Key {
     hasher.update_rayon(cast_slice(&mesh.positions));
     hasher.update_rayon(cast_slice(&mesh.triangles));
     if let Some(deformation) = &mesh.deformation {
-        let clock = (scene.timeline.zero_frame, scene.timeline.frames_per_second);
-        hasher.update(format!("{clock:?}").as_bytes());
+        hasher.update(format!("{:?}", clock(scene)).as_bytes());
         add_deformation(&mut hasher, deformation);
     }
     let material = mesh.material.map(|material| &scene.materials[material as usize]);

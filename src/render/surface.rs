@@ -15,7 +15,7 @@ use super::rays::{Anchor, Hit, HitSurface};
 use crate::math::color::Rgb;
 use crate::math::directions::mirrors;
 use crate::math::{Frame, built_in};
-use crate::scene::{AlphaMode, Material, Mesh, Pose, Scene, TextureUse};
+use crate::scene::{AlphaMode, Material, Mesh, Pose, Scene, Shape, TextureUse};
 use glam::{Affine3A, DMat3, DVec3, Vec2, Vec3, Vec4};
 use std::ops::{Add, Mul};
 
@@ -68,9 +68,8 @@ impl Surface {
 #[derive(Clone, Copy)]
 struct At<'a> {
     mesh: &'a Mesh,
-    positions: &'a [Vec3],
-    normals: &'a [Vec3],
-    tangents: &'a [Vec4],
+    /// Of a mesh that deforms.
+    shape: Option<&'a Shape>,
     corners: [usize; 3],
     weights: [f32; 3],
 }
@@ -149,16 +148,11 @@ impl<'a> Surfaces<'a> {
     fn locate(&self, instance: u32, triangle: u32, barycentric: Vec2) -> (At<'a>, &Material) {
         let number = self.scene.instances[instance as usize].mesh;
         let mesh = &self.scene.meshes[number as usize];
-        let (mut positions, mut normals, mut tangents): (&[Vec3], &[Vec3], &[Vec4]) =
-            (&mesh.positions, &mesh.normals, &mesh.tangents);
-        if let Some(shape) = self.pose.shape(self.scene, number) {
-            (positions, normals, tangents) = (&shape.positions, &shape.normals, &shape.tangents);
-        }
+        let shape = self.pose.shape(self.scene, number);
         let corners = mesh.triangles[triangle as usize].map(|corner| corner as usize);
         let [u, v] = barycentric.to_array();
         let material = mesh.material.map_or(&self.plain, |m| &self.scene.materials[m as usize]);
-        let weights = [1.0 - u - v, u, v];
-        (At { mesh, positions, normals, tangents, corners, weights }, material)
+        (At { mesh, shape, corners, weights: [1.0 - u - v, u, v] }, material)
     }
 
     /// White where there is no texture.
@@ -221,10 +215,11 @@ impl<'a> Surfaces<'a> {
     ) -> Vec3 {
         // Products of axes of 1e-20 m vanish in 32 bits.
         let (mirrored, matrix) = (mirrors(to_world), to_world.matrix3.as_dmat3());
-        let smooth = if at.normals.is_empty() {
+        let normals = at.shape.map_or(&at.mesh.normals, |shape| &shape.normals);
+        let smooth = if normals.is_empty() {
             flat
         } else {
-            let local = at.interpolate(at.normals).as_dvec3();
+            let local = at.interpolate(normals).as_dvec3();
             let across = cofactor(matrix) * local;
             let normal = across.try_normalize().map_or(flat, |across| across.as_vec3());
             if normal.dot(flat) < 0.0 { -normal } else { normal }
@@ -269,15 +264,17 @@ impl At<'_> {
     /// Local tangent, and the sign of the bitangent `normal x tangent`. Derived where the mesh has
     /// none: along growing u; the bitangent then goes up the picture, against growing v.
     fn tangent(&self, used: &TextureUse) -> Option<(DVec3, f32)> {
-        if !self.tangents.is_empty() {
-            let tangent = self.interpolate(self.tangents);
+        let tangents = self.shape.map_or(&self.mesh.tangents, |shape| &shape.tangents);
+        if !tangents.is_empty() {
+            let tangent = self.interpolate(tangents);
             return Some((tangent.truncate().as_dvec3(), 1.0_f32.copysign(tangent.w)));
         }
         let uvs = self.uv_set(used);
         if uvs.is_empty() {
             return None;
         }
-        let [a, b, c] = self.corners.map(|corner| self.positions[corner].as_dvec3());
+        let positions = self.shape.map_or(&self.mesh.positions, |shape| &shape.positions);
+        let [a, b, c] = self.corners.map(|corner| positions[corner].as_dvec3());
         let [ta, tb, tc] = self.corners.map(|corner| used.map(uvs[corner]).as_dvec2());
         let (ab, ac) = (b - a, c - a);
         let (tb, tc) = (tb - ta, tc - ta);

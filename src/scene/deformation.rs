@@ -5,8 +5,8 @@
 //! Normals follow by the cofactors of the matrix, which are its inverse transpose but for a factor, and exist where a
 //! joint has scale 0.
 //!
-//! A [`Pose`](super::Pose) says how far each mesh is [bent](Bend) at its time, which is little and quickly found. The
-//! [shapes](Shapes) are made when somebody first asks for them. Which triangles there are never changes, nor on
+//! A [`Pose`](super::Pose) says how far each mesh is bent at its time, which is little and quickly found. A
+//! [shape](super::Pose::shape) is made when somebody first asks for it. Which triangles there are never changes, nor on
 //! which side their fronts are.
 
 use super::{Keys, Mesh, Node, Scene, Timeline};
@@ -74,7 +74,7 @@ pub struct Skeleton {
 
 /// How far a mesh is bent at one time.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Bend {
+struct Bend {
     /// By morph target.
     weights: Vec<f32>,
     /// By joint: from the vertices at rest to the mesh's space.
@@ -92,7 +92,7 @@ impl Deformation {
 
     /// The shape of the bent mesh, whose triangles are given. A vertex that would be [too far](FARTHEST_M) stays
     /// where it was.
-    pub fn shape(&self, bend: &Bend, triangles: &[[u32; 3]]) -> Shape {
+    fn shape(&self, bend: &Bend, triangles: &[[u32; 3]]) -> Shape {
         let mut shape = self.rest.clone();
         for (target, &weight) in self.targets.iter().zip(&bend.weights) {
             if weight != 0.0 {

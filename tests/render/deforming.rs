@@ -26,8 +26,8 @@ fn shape_of(mesh: &Mesh) -> Shape {
     Shape { positions, normals, tangents }
 }
 
-/// Adds a morph target to a mesh.
-fn morph(mesh: &mut Mesh, by: impl Fn(Vec3) -> Vec3) {
+/// Adds a morph target to a mesh, by which it is displaced most at second 1.
+pub fn morph(mesh: &mut Mesh, by: impl Fn(Vec3) -> Vec3) {
     let rest = shape_of(mesh);
     let positions = rest.positions.iter().map(|&place| by(place)).collect();
     let targets = vec![Target { positions, ..Target::default() }];

@@ -1,5 +1,6 @@
 //! Views of scenes without a camera: what they must show, whatever else is in the scene.
 
+use crate::deforming::morph;
 use crate::stage::{Set, Stage, at, direct, facing, glow, lambert};
 use candelabra::pipeline::{self, ASPECT, View};
 use candelabra::render::RenderSettings;
@@ -265,6 +266,15 @@ fn what_moves_is_framed_wherever_it_is() {
     let mut all = corners(1.0, DVec3::ZERO);
     all.extend(corners(1.0, DVec3::X * 12.0));
     assert_framed("a cube on its way", &mut stage.scene, &all);
+}
+
+/// Displaced vertices are where they are at each moment, not where the first frame has them.
+#[test]
+fn what_deforms_is_framed_wherever_it_is() {
+    let mut stage = cube_stage(1.0, DVec3::ZERO, &[]);
+    morph(&mut stage.scene.meshes[0], |_| Vec3::X * 10.0);
+    let points = [corners(1.0, DVec3::ZERO), corners(1.0, DVec3::X * 10.0)].concat();
+    assert_framed("a cube that is displaced", &mut stage.scene, &points);
 }
 
 #[test]

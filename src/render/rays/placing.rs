@@ -72,6 +72,7 @@ impl Placing {
             let bounds = set.bounds();
             (Item::InWorld { set }, bounds)
         };
+        // A lone instance is searched in world space, as what stands still is: that spares its rays a transform.
         let (alone, crowds): (Vec<_>, Vec<_>) =
             rows.deforming.iter().partition(|(_, instances)| instances.len() == 1);
         let alone: Vec<_> =

@@ -1,7 +1,7 @@
 //! Morph targets and skins: meshes in the shape of the shot's first frame, and what changes that later.
 //!
-//! Source: glTF 2.0, 3.7.2.2 (morph targets) and 3.7.3.3 (skins); UsdSkel's exporter, `scripts/usd_gltf/skinning.py`,
-//! keeps to the same rules.
+//! Source: glTF 2.0, 3.7.2.2 (morph targets) and 3.7.3.3 (skins). The exporter writes whatever deforms on a USD stage as
+//! morph targets, `scripts/usd_gltf/deformation.py`.
 //!
 //! - A vertex is moved by the morph targets first, then by the joints: by the mean, by its weights, of what each joint's
 //!   global transform makes of the inverse bind matrix.
@@ -153,11 +153,12 @@ impl Poses {
         let shape = Shape::take(mesh);
         let rest = shape.clone();
         shape.put(mesh);
+        // What gives light needs no shape but the first.
+        let animated = pose.animated.filter(|_| !emits);
         let (mut targets, mut weights) = (Vec::new(), Vec::new());
         if !pose.weights.is_empty() {
             let first: Vec<f32> = pose.weights.iter().map(|&bits| f32::from_bits(bits)).collect();
-            let all = pose.animated.is_some();
-            match morph::apply(output, arrays, (&first, all), mesh, object)? {
+            match morph::apply(output, arrays, (&first, animated.is_some()), mesh, object)? {
                 Ok(read) => (targets, weights) = (read, first),
                 Err(problem) => {
                     let text = format!("{problem}; drawn without its morph targets");
@@ -167,7 +168,7 @@ impl Poses {
         }
         let mut bound = None;
         if let Some(skin) = pose.skin.filter(|_| is_bound) {
-            let how = How { emits, is_animated: pose.animated.is_some() };
+            let how = How { emits, is_animated: animated.is_some() };
             let skin = (&self.rig, skin);
             match skin::apply(source, output, skin, arrays, (mesh, how), object)? {
                 Ok(joints) => bound = Some(joints),
@@ -178,9 +179,9 @@ impl Poses {
             }
         }
         let hung = bound.as_ref().map(|bound| bound.hung);
-        let animated = pose.animated.filter(|_| !targets.is_empty());
-        let deforms = animated.is_some() || hung.is_some_and(|hung| hung.deforms);
-        let weights = match animated {
+        let is_morphed = pose.animated.is_some() && !targets.is_empty();
+        let deforms = is_morphed || hung.is_some_and(|hung| hung.deforms);
+        let weights = match animated.filter(|_| is_morphed) {
             Some(node) => self.weights[&node].keys.clone(),
             None => weights::constant(&weights),
         };
