@@ -84,6 +84,13 @@ pub fn frontier(points: &[Point]) -> Vec<bool> {
 mod tests {
     use super::*;
 
+    #[test]
+    fn two_errors_that_took_as_many_samples_have_a_time() {
+        let point = |seconds, error| Point { samples: 8.0, seconds, error };
+        let found = reach(&[point(1.0, 0.06), point(1.5, 0.04)], 0.05).unwrap();
+        assert_eq!((found.samples, found.seconds, found.is_beyond), (8, 1.5, false));
+    }
+
     fn point(samples: f64, seconds: f64, error: f64) -> Point {
         Point { samples, seconds, error }
     }

@@ -159,9 +159,8 @@ fn budgets(trade: &Trade) -> Table {
     columns.extend([Column::number("lights"), Column::text("frontier")]);
     let rows = trade.rows.iter().map(|row| {
         let ink = trade.curves.iter().position(|curve| row.is_of(curve)).unwrap_or(0);
-        let name = if row.asked.is_some() { row.name.clone() } else { row.entrant.way.to_string() };
         let mut cells =
-            vec![Cell::Key(INKS[ink % INKS.len()], name), Cell::count(row.samples as usize)];
+            vec![Cell::Key(INKS[ink % INKS.len()], row.way()), Cell::count(row.samples as usize)];
         cells.extend([row.seconds, row.error].map(Cell::short));
         cells.push(row.decibels.map_or(Cell::Empty, Cell::short));
         cells.extend([row.errors[0], row.errors[1], row.worst_percent].map(Cell::short));

@@ -152,6 +152,11 @@ impl Row {
         Point { samples: samples.into(), seconds, error }
     }
 
+    /// Its way, with the error if one was asked for. Its samples are told beside it.
+    pub fn way(&self) -> String {
+        if self.asked.is_some() { self.name.clone() } else { self.entrant.way.to_string() }
+    }
+
     /// What its curve is of: its way, and whether an error was asked for.
     fn kind(&self) -> (Way, bool) {
         (self.entrant.way, self.asked.is_some())

@@ -59,7 +59,7 @@ fn print_trade(out: &mut impl Write, trade: &Trade) -> Result<()> {
         writeln!(
             out,
             "{:<24} {:>8} {:>9.3} {:>9.4} {:>6} {:>10.3} {:>8.2} % {:>8.2} {}",
-            if row.asked.is_some() { row.name.clone() } else { row.entrant.way.to_string() },
+            row.way(),
             row.samples,
             row.seconds,
             row.error,
