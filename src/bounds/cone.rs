@@ -83,6 +83,12 @@ impl Cone {
         Cone { axis, theta_o, theta_e, two_sided }
     }
 
+    /// What a single emitter sends in the mean over all directions, as a share of its peak: the
+    /// [measure](Self::measure) over that of the whole sphere. 1/4 for a flat face, 1 for all directions.
+    pub fn share(&self) -> f32 {
+        (self.measure() * (0.5 / TAU)).clamp(0.0, 1.0)
+    }
+
     /// How much of the sphere the cone lights, weighted by the cosine beyond `theta_o`: the seed's
     /// `M_omega` in closed form. `pi` for a flat face, `4 pi` for all directions.
     pub fn measure(&self) -> f32 {

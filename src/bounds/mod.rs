@@ -23,21 +23,32 @@ pub struct LightBounds {
     /// An estimate of what it contributes: the peak radiant intensity of its emitters, summed. One
     /// scale for all kinds (`I` of a point, `L A` of a triangle). Positive.
     pub energy: f32,
+    /// What it sends in the mean over all directions, as a share of `energy`: 1 for a point or a sphere, 1/4 for a
+    /// face. It tells spheres from faces where normals point everywhere.
+    pub share: f32,
     /// Beyond this distance it gives no light (glTF's `range`), metres; infinite if it is physical.
     pub range_m: f32,
 }
 
 impl LightBounds {
+    /// The bounds of one emitter, whose share is that of its cone.
+    pub fn of_emitter(aabb: Aabb, cone: Cone, energy: f32, range_m: f32) -> LightBounds {
+        LightBounds { aabb, cone, energy, share: cone.share(), range_m }
+    }
+
     /// The bounds around several.
     ///
     /// # Panics
     /// If there are none.
     pub fn around(parts: &[LightBounds]) -> LightBounds {
         let cones: Vec<Cone> = parts.iter().map(|part| part.cone).collect();
+        let energy: f64 = parts.iter().map(|part| f64::from(part.energy)).sum();
+        let sent = parts.iter().map(|part| f64::from(part.energy) * f64::from(part.share));
         LightBounds {
             aabb: parts.iter().fold(Aabb::EMPTY, |all, part| all.union(&part.aabb)),
             cone: Cone::around(&cones),
-            energy: parts.iter().map(|part| f64::from(part.energy)).sum::<f64>() as f32,
+            energy: energy as f32,
+            share: (sent.sum::<f64>() / energy) as f32,
             range_m: parts.iter().map(|part| part.range_m).fold(0.0, f32::max),
         }
     }
@@ -51,6 +62,7 @@ impl LightBounds {
             && self.cone.theta_e.is_finite()
             && self.energy.is_finite()
             && self.energy > 0.0
+            && (0.0..=1.0).contains(&self.share)
             && self.range_m > 0.0
     }
 }

@@ -107,14 +107,10 @@ impl PosedEmitters<'_> {
                 Cone::flat(normal.as_vec3(), double_sided)
             }
         };
-        LightBounds {
-            aabb: Aabb::around(triangle.corners),
-            cone,
-            energy: luminance(nits * mesh_light.texture_mean(own))
-                * triangle.area()
-                * self.mean(mesh_light.shaping),
-            range_m: f32::INFINITY,
-        }
+        let energy = luminance(nits * mesh_light.texture_mean(own))
+            * triangle.area()
+            * self.mean(mesh_light.shaping);
+        LightBounds::of_emitter(Aabb::around(triangle.corners), cone, energy, f32::INFINITY)
     }
 
     fn bounds_of_light(&self, row: u32) -> LightBounds {
@@ -139,7 +135,7 @@ impl PosedEmitters<'_> {
             }
         };
         let aabb = Aabb { min: here - radius, max: here + radius };
-        LightBounds { aabb, cone, energy, range_m: light.range_m.unwrap_or(f32::INFINITY) }
+        LightBounds::of_emitter(aabb, cone, energy, light.range_m.unwrap_or(f32::INFINITY))
     }
 
     /// A cone around the directions in which shaped light leaves.

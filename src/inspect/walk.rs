@@ -167,7 +167,7 @@ mod tests {
 
     fn lamp(at: Vec3, energy: f32) -> LightBounds {
         let aabb = Aabb { min: at, max: at };
-        LightBounds { aabb, cone: Cone::ALL, energy, range_m: f32::INFINITY }
+        LightBounds::of_emitter(aabb, Cone::ALL, energy, f32::INFINITY)
     }
 
     /// A lamp of its own, and a string of twelve that is put somewhere: turned, larger, brighter.

@@ -33,6 +33,13 @@ const EDGE_SLACK: f32 = 1e-3;
 const FLOOR: f32 = 1e-4;
 /// The least share of the largest cosine that is expected: emitters are not spread evenly.
 const LEAST_EXPECTED: f32 = 0.02;
+/// The mean square of a cosine over its mean, for faces on all sides, whose backs are dark: 1/6 over 1/4.
+const FACES: f32 = 2.0 / 3.0;
+/// The largest squared relative deviation of a cosine that is reckoned with.
+const MOST_DEVIATION: f32 = 8.0;
+/// How much of the deviation of the cosine at a surface counts as uncertain. That of distances has a part in it, and
+/// measured variances are least with about this.
+const AT_SURFACE: f32 = 0.4;
 /// The mean of a square coordinate over a box, as a share of the square of its half edge.
 const MEAN_SQUARE: f32 = 1.0 / 3.0;
 /// The share of the sphere's squared radius that softens the squared distance.
@@ -52,6 +59,8 @@ pub struct Cluster {
     pub axis: [f32; 3],
     pub sin_half_theta_o: f32,
     pub cos_theta_e: f32,
+    /// What leaves in the mean over all directions, as a share of the largest; used where normals point everywhere.
+    pub share: f32,
     pub two_sided: bool,
     /// `1 / range^2` of the longest range in it, 1/m^2; 0 if any light in it has no range.
     pub inverse_range2: f32,
@@ -84,6 +93,12 @@ impl Cluster {
         View { radius: half.length(), distance: (center - p.as_dvec3()).length() }
     }
 
+    /// Whether normals point everywhere.
+    #[inline(always)]
+    fn is_round(&self) -> bool {
+        self.sin_half_theta_o >= 1.0
+    }
+
     /// The share of its light that leaves at some angle off its axis, for a cluster seen under the half
     /// angle `theta_u`: 1 inside the cone, falling to its edge, 0 only surely beyond. The angle is given
     /// by cosine and sine, because a cosine alone does not resolve small angles. Also returns the cosine
@@ -101,7 +116,7 @@ impl Cluster {
         // The sine of theta_o + theta_u is negative where the sum is beyond pi.
         let sin_sum = sin_o * cos_u + cos_o * sin_u;
         let cos_sum = cos_o * cos_u - sin_o * sin_u;
-        let within = inside | (sin_half >= 1.0) | (sin_sum < 0.0) | (cosine >= cos_sum);
+        let within = inside | self.is_round() | (sin_sum < 0.0) | (cosine >= cos_sum);
         let off = cosine * cos_sum + sine * sin_sum;
         // A lower bound of the cosine of theta_e plus the slack.
         let cos_e = self.cos_theta_e;
@@ -112,22 +127,45 @@ impl Cluster {
         (if is_dark { 0.0 } else { emission }, cos_o)
     }
 
-    /// The share that is expected to leave at some angle off the axis, given by its cosine: `emission` is the
-    /// largest. Normals are spread evenly over the cone. `offset2` is the mean square of the directions to emitters
-    /// across that to the centre. Where light leaves in every direction, nothing is known of normals.
+    /// The share that is expected to leave at some angle off the axis, given by its cosine, and its squared relative
+    /// deviation from emitter to emitter; `emission` is the largest share. Normals are spread evenly over the cone.
+    /// `offset2` is the mean square of the directions to emitters across that to the centre. Where normals point
+    /// everywhere, the share of the node is expected: of a cluster of spheres all light, of faces a quarter.
     #[inline(always)]
-    fn expected_emission(&self, emission: f32, cosine: f32, cos_o: f32, offset2: f32) -> f32 {
+    fn expected_emission(
+        &self,
+        emission: f32,
+        cosine: f32,
+        cos_o: f32,
+        offset2: f32,
+    ) -> (f32, f32) {
         // Mean and variance of the cosine between a direction and a unit vector spread over a cap.
         let mean = cosine * 0.5 * (1.0 + cos_o);
         let along = (1.0 + cos_o + cos_o * cos_o) * (1.0 / 3.0);
         let across = 0.5 * (1.0 - along);
         let square = along * cosine * cosine + across * (1.0 - cosine * cosine) + offset2;
         let half = (3.0 * (square - mean * mean).max(0.0)).sqrt();
-        let back = if self.two_sided { clipped_mean(-mean, half) } else { 0.0 };
+        let (front, front2) = clipped_moments(mean, half);
+        let (back, back2) = if self.two_sided { clipped_moments(-mean, half) } else { (0.0, 0.0) };
         // Of beams narrower than a hemisphere, fewer reach any one point.
-        let beam = (2.0 * (1.0 - self.cos_theta_e) / (1.0 - cos_o).max(1e-9)).min(1.0);
-        let share = ((clipped_mean(mean, half) + back) * beam).max(LEAST_EXPECTED * emission);
-        if cos_o > -1.0 { share } else { emission }
+        let beam = (2.0 * (1.0 - self.cos_theta_e) / (1.0 - cos_o).max(1e-9)).clamp(1e-9, 1.0);
+        let of_cone = ((front + back) * beam, (front2 + back2) * beam);
+        // The mean square is that of faces and of spheres, and between them a line.
+        let of_all = (self.share, (self.share * (10.0 / 9.0) - 1.0 / 9.0).max(self.share * FACES));
+        let moments = if self.is_round() { of_all } else { of_cone };
+        (moments.0.max(LEAST_EXPECTED * emission), deviation(moments))
+    }
+
+    /// The squared relative deviation of narrow beams spread over a wide cone, of which most miss any one point. It is 0
+    /// for faces and points, which reach half of all and every one.
+    #[inline(always)]
+    pub fn missed(&self, cos_o: f32) -> f32 {
+        let missed = if self.is_round() {
+            1.0 / self.share.max(1e-9) - 4.0
+        } else {
+            (1.0 - cos_o) / (1.0 - self.cos_theta_e).max(1e-9) - 2.0
+        };
+        missed.max(0.0)
     }
 
     /// The share of light that the range leaves at a squared distance, m^2; 0 only surely out of range.
@@ -160,14 +198,10 @@ const CLOSEST: f32 = 0.05;
 
 /// The squared relative deviation of `1/d^2` for distances spread over a sphere of squared radius
 /// `r2` at a squared distance `d2`: `(4/3) R^2 / (d^2 - R^2)`, which is HPG 2018's equations 8 and 9
-/// without their cancellation. A second term is that of emission, for narrow beams spread over a wide
-/// cone: most of them miss a receiver. (It is 0 for faces and points, which reach half of all receivers
-/// and every one.)
+/// without their cancellation.
 #[inline(always)]
-pub(super) fn spread(r2: f32, d2: f32, cos_o: f32, cos_e: f32) -> f32 {
-    let of_distance = 4.0 / 3.0 * r2 / (d2 - r2).max(CLOSEST * r2).max(f32::MIN_POSITIVE);
-    let of_direction = ((1.0 - cos_o) / (1.0 - cos_e).max(1e-9) - 2.0).max(0.0);
-    of_distance + of_direction
+pub(super) fn spread_of_distance(r2: f32, d2: f32) -> f32 {
+    4.0 / 3.0 * r2 / (d2 - r2).max(CLOSEST * r2).max(f32::MIN_POSITIVE)
 }
 
 /// The sphere of a cluster as a surface sees it: a cone of directions.
@@ -190,12 +224,20 @@ impl Sight {
     }
 }
 
-/// The mean of a cosine that is spread evenly over a mean and `half` to either side, with 0 for all that is
-/// below 0.
+/// The mean, and the mean square, of a cosine that is spread evenly over a mean and `half` to either side, with 0 for
+/// all that is below 0.
 #[inline(always)]
-fn clipped_mean(mean: f32, half: f32) -> f32 {
+fn clipped_moments(mean: f32, half: f32) -> (f32, f32) {
     let high = (mean + half).max(0.0);
-    if mean >= half { mean } else { high * high / (4.0 * half).max(f32::MIN_POSITIVE) }
+    let inverse = 1.0 / half.max(f32::MIN_POSITIVE);
+    let clipped = (high * high * 0.25 * inverse, high * high * high * (1.0 / 6.0) * inverse);
+    if mean >= half { (mean, mean * mean + half * half * (1.0 / 3.0)) } else { clipped }
+}
+
+/// The squared relative deviation of what has these moments; bounded.
+#[inline(always)]
+fn deviation((mean, square): (f32, f32)) -> f32 {
+    (square / (mean * mean).max(f32::MIN_POSITIVE) - 1.0).clamp(0.0, MOST_DEVIATION)
 }
 
 /// The factors of the importance, which is energy times product over decay. They leave out what becomes
@@ -236,7 +278,9 @@ pub(super) fn factors(cluster: &Cluster, receiver: &Receiver) -> Factors {
     let mean_d2 = d2 + MEAN_SQUARE * r2;
     let inverse_mean = if mean_d2 > 0.0 { 1.0 / mean_d2.sqrt() } else { 0.0 };
     let offset2 = MEAN_SQUARE * MEAN_SQUARE * r2 * inverse_mean * inverse_mean;
-    let emission = cluster.expected_emission(emission, along * d * inverse_mean, cos_o, offset2);
+    let near = sin_u * sin_u * sin_u * sin_u;
+    let (emission, uneven) =
+        cluster.expected_emission(emission, along * d * inverse_mean, cos_o, offset2);
 
     // Reception: the largest cosine that any point of the sphere can have, or from outside the one that is
     // expected of the box. Inside, what is near decides, wherever that is. Without a normal every direction
@@ -245,9 +289,9 @@ pub(super) fn factors(cluster: &Cluster, receiver: &Receiver) -> Factors {
     let cosine_i = (-below * inverse_d).clamp(-1.0, 1.0);
     let sine_i = (1.0 - cosine_i * cosine_i).sqrt();
     let best = if cosine_i >= cos_u { 1.0 } else { cosine_i * cos_u + sine_i * sin_u };
-    let expected = clipped_mean(-below * inverse_mean, reach * inverse_mean);
-    let expected = expected.max(LEAST_EXPECTED * best);
-    let near = sin_u * sin_u * sin_u * sin_u;
+    let moments = clipped_moments(-below * inverse_mean, reach * inverse_mean);
+    let unsure = if in_medium { 0.0 } else { AT_SURFACE * deviation(moments) };
+    let expected = moments.0.max(LEAST_EXPECTED * best);
     let likely = (expected + near * (best - expected)).max(FLOOR);
     let cosine = if inside | in_medium { 1.0 } else { likely };
     let to = [-vx * inverse_d, -vy * inverse_d, -vz * inverse_d];
@@ -261,7 +305,8 @@ pub(super) fn factors(cluster: &Cluster, receiver: &Receiver) -> Factors {
     Factors {
         product: if is_below | is_dark { 0.0 } else { product },
         decay: distance2,
-        spread: spread(r2, d2, cos_o, cluster.cos_theta_e),
+        // No number where a square overflows; then nothing is known to be uncertain.
+        spread: (spread_of_distance(r2, d2) + uneven + unsure).max(0.0),
         sight: Sight { to, cosine, cos_u, sin_u },
     }
 }

@@ -12,6 +12,7 @@ use crate::math::angle::between;
 use crate::store::Rule;
 use bytemuck::{Pod, Zeroable};
 use glam::{DVec3, Vec2, Vec3};
+use std::f32::consts::FRAC_PI_2;
 use std::sync::LazyLock;
 
 /// One emitter or one cluster, on its own; a [group](super::group::Group) holds eight.
@@ -72,7 +73,8 @@ const TWO_SIDED_BIT: u16 = 1 << 15;
 const AXIS_STEPS: f32 = 32767.0;
 /// `sin(theta_o / 2)` in `[0, 1]` takes fifteen bits: nearly even steps in angle, 1e-4 rad.
 const THETA_O_STEPS: f64 = 32767.0;
-/// `sqrt(1 - cos theta_e)` in `[0, 1]` takes eight, likewise.
+/// `sqrt(1 - cos theta_e)` in `[0, 1]` takes eight, likewise. Where normals point everywhere, `theta_e` has no meaning,
+/// and the root of the share takes its place.
 const THETA_E_STEPS: f64 = 255.0;
 /// An angle is multiplied by this before it is rounded up. It makes up for what `f32` loses between
 /// decoding and encoding again, which must not widen a cone. Far below the slack that importance allows.
@@ -87,7 +89,12 @@ impl Node {
         let tilt = between(Vec3::from_array(decode_axis(axis)).normalize(), bounds.cone.axis);
         // `between` of equal vectors is exactly 0, so an axis that is encoded exactly widens nothing.
         let theta_o = (sin_half(bounds.cone.theta_o + tilt) * THETA_O_STEPS).ceil();
-        let theta_e = (2f64.sqrt() * sin_half(bounds.cone.theta_e) * THETA_E_STEPS).ceil();
+        let theta_o = theta_o.min(THETA_O_STEPS);
+        let theta_e = if theta_o == THETA_O_STEPS {
+            (f64::from(bounds.share).sqrt() * THETA_E_STEPS).round()
+        } else {
+            (2f64.sqrt() * sin_half(bounds.cone.theta_e) * THETA_E_STEPS).ceil()
+        };
         let two_sided = if bounds.cone.two_sided { TWO_SIDED_BIT } else { 0 };
         Node {
             center: center.to_array(),
@@ -95,7 +102,7 @@ impl Node {
             half_extent,
             half_exponent,
             axis,
-            theta_o: theta_o.min(32767.0) as u16 | two_sided,
+            theta_o: theta_o as u16 | two_sided,
             theta_e: theta_e.min(255.0) as u8,
             range: encode_range(bounds.range_m),
             link: link.encode(),
@@ -108,15 +115,23 @@ impl Node {
         let angle = |sin_half: f64| (2.0 * sin_half.min(1.0).asin()) as f32;
         let theta_o = f64::from(self.theta_o & !TWO_SIDED_BIT) / THETA_O_STEPS;
         let theta_e = f64::from(self.theta_e) / (2f64.sqrt() * THETA_E_STEPS);
+        let is_round = is_round(self.theta_o);
+        let cone = Cone {
+            axis: Vec3::from_array(decode_axis(self.axis)).normalize(),
+            theta_o: angle(theta_o),
+            theta_e: if is_round { FRAC_PI_2 } else { angle(theta_e) },
+            two_sided: is_two_sided(self.theta_o),
+        };
         LightBounds {
             aabb: Aabb { min: round_down(center - half), max: -round_down(-center - half) },
-            cone: Cone {
-                axis: Vec3::from_array(decode_axis(self.axis)).normalize(),
-                theta_o: angle(theta_o),
-                theta_e: angle(theta_e),
-                two_sided: is_two_sided(self.theta_o),
-            },
+            cone,
             energy: self.energy,
+            // Spheres make a cluster round, so these are faces and spots, each with a cone of its own.
+            share: if is_round {
+                decode_share(self.theta_e)
+            } else {
+                Cone { theta_o: 0.0, ..cone }.share()
+            },
             range_m: decode_range(self.range),
         }
     }
@@ -153,6 +168,7 @@ impl Node {
             axis: decode_axis(self.axis),
             sin_half_theta_o: decode_sin_half_theta_o(self.theta_o),
             cos_theta_e: decode_cos_theta_e(self.theta_e),
+            share: decode_share(self.theta_e),
             two_sided: is_two_sided(self.theta_o),
             inverse_range2: decode_inverse_range2(self.range),
         }
@@ -193,7 +209,7 @@ impl Node {
         if reach.cmpgt(self.half_extent().as_dvec3()).any() {
             return Some(rules::BOX_IS_IN_PARENT);
         }
-        if child.theta_e > self.theta_e
+        if (child.theta_e > self.theta_e && !is_round(self.theta_o))
             || (is_two_sided(child.theta_o) && !is_two_sided(self.theta_o))
         {
             return Some(rules::EMISSION_IS_IN_PARENT);
@@ -202,8 +218,7 @@ impl Node {
             return Some(rules::RANGE_IS_IN_PARENT);
         }
         let code = |node: &Node| node.theta_o & !TWO_SIDED_BIT;
-        let everywhere = code(self) == !TWO_SIDED_BIT;
-        if everywhere || (self.axis == child.axis && code(child) <= code(self)) {
+        if is_round(self.theta_o) || (self.axis == child.axis && code(child) <= code(self)) {
             return None;
         }
         // cos(theta_d + theta_c) >= cos(theta_p + tolerance), and the sum is not beyond pi.
@@ -308,8 +323,14 @@ pub(super) fn is_round(code: u16) -> bool {
 
 #[inline(always)]
 pub(super) fn decode_cos_theta_e(code: u8) -> f32 {
+    1.0 - decode_share(code)
+}
+
+/// What the code of `theta_e` says where normals point everywhere.
+#[inline(always)]
+pub(super) fn decode_share(code: u8) -> f32 {
     let root = f32::from(code) * (1.0 / THETA_E_STEPS as f32);
-    1.0 - root * root
+    root * root
 }
 
 /// Codes per octave of range.

@@ -6,7 +6,7 @@
 //! the integral of `1/r^2` over the stretch, `(theta_b - theta_a) / d` (HPG 2018, equation 4), which
 //! also knows how long the stretch is.
 
-use super::importance::{Cluster, Factors, SOFTENING, Sight, View, spread};
+use super::importance::{Cluster, Factors, SOFTENING, Sight, View, spread_of_distance};
 use super::viewer::Viewer;
 use crate::math::Similarity;
 use glam::{DVec3, Vec3};
@@ -118,7 +118,7 @@ impl Viewer for Segment {
         Factors {
             product: if is_dark { 0.0 } else { product },
             decay: line as f32,
-            spread: spread(r2 as f32, passage.nearest2 as f32, cos_o, cluster.cos_theta_e),
+            spread: spread_of_distance(r2 as f32, passage.nearest2 as f32) + cluster.missed(cos_o),
             sight: Sight::default(),
         }
     }
@@ -194,9 +194,7 @@ mod tests {
         fn a_point_is_integrated_exactly(segment in segment(), place in point()) {
             let passage = segment.passage(place);
             prop_assume!(segment.length.is_finite() && passage.nearest2 > 1e-2);
-            let bounds = LightBounds {
-                aabb: Aabb::around([place]), cone: Cone::ALL, energy: 2.0, range_m: f32::INFINITY,
-            };
+            let bounds = LightBounds::of_emitter(Aabb::around([place]), Cone::ALL, 2.0, f32::INFINITY);
             let importance = Node::encode(&bounds, Link::Emitter(0)).importance(&segment);
             const STEPS: u32 = 4000;
             let step = f64::from(segment.length) / f64::from(STEPS);
@@ -217,7 +215,7 @@ mod tests {
             prop_assume!(axis.length() > 0.1);
             let cone = Cone::spot(axis.normalize(), theta_e);
             let aabb = Aabb { min: place - size, max: place + size };
-            let node = Node::encode(&LightBounds { aabb, cone, energy: 1.0, range_m }, Link::Emitter(0));
+            let node = Node::encode(&LightBounds::of_emitter(aabb, cone, 1.0, range_m), Link::Emitter(0));
             if node.importance(&segment) > 0.0 {
                 return Ok(());
             }

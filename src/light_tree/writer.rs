@@ -11,7 +11,7 @@ use super::records::{
 use super::tree::LightTree;
 use crate::bounds::LightBounds;
 use crate::math::Similarity;
-use crate::store::{AlignedBytes, ContainerWriter, TREE_FILE_WITHOUT_LINKS};
+use crate::store::{AlignedBytes, ContainerWriter};
 use rayon::prelude::*;
 
 /// What a tree file says of one light.
@@ -274,8 +274,7 @@ impl<'a> LightTreeWriter<'a> {
         // A file whose lights light everything has no links.
         if !lights.links.is_empty() {
             file.section(records::LINKS, false, &lights.links);
-            return file.finish(fingerprint);
         }
-        file.finish_as(&TREE_FILE_WITHOUT_LINKS, fingerprint)
+        file.finish(fingerprint)
     }
 }

@@ -256,6 +256,7 @@ pub(super) fn in_world(own: &LightBounds, placed: &PlacedLight) -> LightBounds {
             ..own.cone
         },
         energy: (own.energy * placed.brightness).max(f32::MIN_POSITIVE),
+        share: own.share,
         range_m: own.range_m / placed.to_local.scale(),
     }
 }

@@ -13,8 +13,8 @@ use rayon::prelude::*;
 const TOGETHER: usize = 1 << 12;
 /// Bytes laid out at a time.
 const MOST_BYTES: usize = 1 << 22;
-/// Bytes of bounds: twelve numbers, a side and a range.
-const BOUNDS: usize = 53;
+/// Bytes of bounds: fourteen numbers and a side.
+const BOUNDS: usize = 57;
 
 /// Over the shot, by that of what stands still and those of its frames.
 pub(super) fn of_shot(still: &[u8; 32], frames: impl Iterator<Item = (i32, [u8; 32])>) -> [u8; 32] {
@@ -100,7 +100,7 @@ pub(super) fn of_bounds(bounds: &[LightBounds]) -> [u8; 32] {
 }
 
 fn bytes_of(bounds: &LightBounds) -> [u8; BOUNDS] {
-    let LightBounds { aabb, cone, energy, range_m } = bounds;
+    let LightBounds { aabb, cone, energy, share, range_m } = bounds;
     let mut bytes = [0; BOUNDS];
     let numbers: [[f32; 3]; 4] = [
         aabb.min.to_array(),
@@ -110,6 +110,7 @@ fn bytes_of(bounds: &LightBounds) -> [u8; BOUNDS] {
     ];
     bytes[..48].copy_from_slice(bytemuck::cast_slice(&numbers));
     bytes[48..52].copy_from_slice(&range_m.to_le_bytes());
-    bytes[52] = cone.two_sided.into();
+    bytes[52..56].copy_from_slice(&share.to_le_bytes());
+    bytes[56] = cone.two_sided.into();
     bytes
 }

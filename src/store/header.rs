@@ -7,7 +7,7 @@ use bytemuck::{Pod, Zeroable};
 /// text mode would change (PNG's manner).
 pub const MAGIC: [u8; 8] = *b"\x89LTR\r\n\x1a\n";
 /// Readers refuse another major version and read every minor one.
-pub const VERSION: (u16, u16) = (1, 3);
+pub const VERSION: (u16, u16) = (1, 4);
 
 /// A kind of file: what it begins with, and its version.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -20,8 +20,6 @@ pub struct Form {
 
 /// Tree files.
 pub const TREE_FILE: Form = Form { magic: MAGIC, version: VERSION };
-/// Tree files without `LINK`, which is all that version 1.3 added: they are what they were.
-pub const TREE_FILE_WITHOUT_LINKS: Form = Form { magic: MAGIC, version: (1, 2) };
 
 pub(super) const BYTE_ORDER_MARK: u32 = 0x0102_0304;
 /// What stands before the section table.

@@ -20,7 +20,7 @@ pub use atomic::{check_room, check_writable, folder_of, is_full, sweep, write_at
 pub use bytes::{ALIGNMENT, AlignedBytes};
 pub use container::{Container, ContainerWriter, Section, SectionId};
 pub use error::{RULES_OF_HEADER, RULES_OF_TABLE, StoreError};
-pub use header::{Form, MAGIC, TREE_FILE, TREE_FILE_WITHOUT_LINKS, VERSION};
+pub use header::{Form, MAGIC, TREE_FILE, VERSION};
 pub use map::MappedFile;
 pub use regular::{open_regular, read_regular};
 pub(crate) use rule::rules;

@@ -35,12 +35,12 @@ fn triangles(count: u32) -> Vec<LightBounds> {
             let a = place(i);
             let (b, c) = (a + 0.05 * direction(i, 3), a + 0.05 * direction(i, 5));
             let normal = (b - a).cross(c - a);
-            LightBounds {
-                aabb: Aabb::around([a, b, c]),
-                cone: Cone::flat(normal.normalize_or(Vec3::Z), false),
-                energy: normal.length() * (0.5 + random(i, 7)) + 1e-9,
-                range_m: f32::INFINITY,
-            }
+            LightBounds::of_emitter(
+                Aabb::around([a, b, c]),
+                Cone::flat(normal.normalize_or(Vec3::Z), false),
+                normal.length() * (0.5 + random(i, 7)) + 1e-9,
+                f32::INFINITY,
+            )
         })
         .collect()
 }

@@ -17,7 +17,7 @@ const EMITTER: u32 = 1 << 31;
 const INSTANCE: u32 = 3 << 30;
 
 fn point(energy: f32) -> LightBounds {
-    LightBounds { aabb: Aabb::around([Vec3::ONE]), cone: Cone::ALL, energy, range_m: f32::INFINITY }
+    LightBounds::of_emitter(Aabb::around([Vec3::ONE]), Cone::ALL, energy, f32::INFINITY)
 }
 
 /// A file over so many points in one place.

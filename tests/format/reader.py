@@ -82,7 +82,11 @@ class Node:
         self.axis = axis_of(*axis)
         self.theta_o = 2 * math.asin((theta_o & 0x7FFF) / 32767)
         self.two_sided = theta_o >> 15 == 1
-        self.theta_e = math.acos(1 - (theta_e / 255) ** 2)
+        if self.theta_o == math.pi:
+            self.theta_e, self.share = math.pi / 2, (theta_e / 255) ** 2
+        else:
+            self.theta_e = math.acos(1 - (theta_e / 255) ** 2)
+            self.share = math.sin(self.theta_e) ** 2 / 4 * (2 if self.two_sided else 1)
         self.range = math.inf if reach == 0 else 2 ** ((reach - 1) / 4 - 31.75)
         self.link = link
 
@@ -296,7 +300,8 @@ def check_inside(child, parent):
     for axis in range(3):
         apart = abs(child.center[axis] - parent.center[axis])
         require(apart + child.half[axis] <= parent.half[axis], "GRUP 7")
-    require(child.theta_e <= parent.theta_e and child.two_sided <= parent.two_sided, "GRUP 8")
+    lit = child.theta_e <= parent.theta_e or parent.theta_o == math.pi
+    require(lit and child.two_sided <= parent.two_sided, "GRUP 8")
     require(child.range <= parent.range, "GRUP 9")
     cosine = sum(a * b for a, b in zip(child.axis, parent.axis))
     cosine = abs(cosine) if parent.two_sided else cosine

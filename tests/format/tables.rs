@@ -123,12 +123,7 @@ fn a_header_that_lies_about_the_table_is_refused() {
 /// has an answer.
 #[test]
 fn no_frames_are_no_frames() {
-    let lone = LightBounds {
-        aabb: Aabb::around([Vec3::Y]),
-        cone: Cone::ALL,
-        energy: 1.0,
-        range_m: f32::INFINITY,
-    };
+    let lone = LightBounds::of_emitter(Aabb::around([Vec3::Y]), Cone::ALL, 1.0, f32::INFINITY);
     let mut writer = LightTreeWriter::default();
     writer.add_tree(TreeKind::Still, &[lone], |_| Link::Emitter(0));
     let light = LightSummary {

@@ -10,7 +10,7 @@ use glam::Vec3;
 use proptest::prelude::*;
 
 fn point(p: Vec3, energy: f32) -> LightBounds {
-    LightBounds { aabb: Aabb::around([p]), cone: Cone::ALL, energy, range_m: f32::INFINITY }
+    LightBounds::of_emitter(Aabb::around([p]), Cone::ALL, energy, f32::INFINITY)
 }
 
 /// Groups above the deepest leaf.

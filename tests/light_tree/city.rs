@@ -209,6 +209,7 @@ pub fn in_world(own: &LightBounds, placed: &Placed) -> LightBounds {
             ..own.cone
         },
         energy: (own.energy * placed.brightness).max(f32::MIN_POSITIVE),
+        share: own.share,
         range_m: own.range_m / to_local.scale(),
     }
 }

@@ -80,7 +80,7 @@ fn lit() -> impl Strategy<Value = Lit> {
             // As far as the viewer is, once its place is rounded.
             let rounded = (reached.as_vec3().as_dvec3() - emitter).length();
             let range_m = (rounded * (1.0 + beyond)) as f32;
-            let bounds = LightBounds { aabb, cone, energy: 1.0, range_m };
+            let bounds = LightBounds::of_emitter(aabb, cone, 1.0, range_m);
             Lit { bounds, emitter, normal, reached }
         },
     )

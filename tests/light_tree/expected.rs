@@ -48,12 +48,12 @@ fn told_and_sent(numbers: &mut Numbers) -> (f64, f64) {
         let unit = way.normalize();
         sum += facing.dot(unit).max(0.0) * normal.dot(-unit).max(0.0) / way.length_squared();
     }
-    let bounds = LightBounds {
-        aabb: Aabb { min: (-half).as_vec3(), max: half.as_vec3() },
-        cone: Cone { theta_o: theta_o as f32, ..Cone::flat(axis.as_vec3(), false) },
-        energy: 1.0,
-        range_m: f32::INFINITY,
-    };
+    let bounds = LightBounds::of_emitter(
+        Aabb { min: (-half).as_vec3(), max: half.as_vec3() },
+        Cone { theta_o: theta_o as f32, ..Cone::flat(axis.as_vec3(), false) },
+        1.0,
+        f32::INFINITY,
+    );
     let receiver = Receiver { point: point.as_vec3(), normal: normal.as_vec3() };
     let told = Node::encode(&bounds, Link::Emitter(0)).importance(&receiver);
     (told, sum / FACES as f64)
@@ -82,16 +82,82 @@ fn faces_send_on_average_what_the_importance_says() {
 #[test]
 fn a_small_face_is_told_exactly() {
     let at = Vec3::new(0.3, -0.2, 0.5);
-    let bounds = LightBounds {
-        aabb: Aabb { min: at, max: at },
-        cone: Cone::flat(Vec3::new(0.6, 0.0, 0.8), false),
-        energy: 2.5,
-        range_m: f32::INFINITY,
-    };
+    let bounds = LightBounds::of_emitter(
+        Aabb { min: at, max: at },
+        Cone::flat(Vec3::new(0.6, 0.0, 0.8), false),
+        2.5,
+        f32::INFINITY,
+    );
     let receiver = Receiver { point: Vec3::new(1.0, 0.4, 1.9), normal: Vec3::NEG_Z };
     let way = (receiver.point - at).as_dvec3();
     let cosines = way.dot(DVec3::new(0.6, 0.0, 0.8)) * way.z / way.length_squared();
     let exact = 2.5 * cosines / way.length_squared();
     let told = Node::encode(&bounds, Link::Emitter(0)).importance(&receiver);
     assert!((told / exact - 1.0).abs() < 1e-3, "{told} {exact}");
+}
+
+/// Points and faces in one box, faces with normals on all sides: what a cluster of both is expected to send lies
+/// between the quarter of the faces and the whole of the points, as their energies do.
+#[test]
+fn points_and_faces_on_all_sides_send_on_average_what_the_importance_says() {
+    let mut numbers = Numbers(7);
+    for of_points in [0.0, 0.1, 0.5, 0.9, 1.0] {
+        for both_sides in [false, true] {
+            let mut off = Vec::new();
+            for _ in 0..60 {
+                let (told, sent) = of_points_and_faces(&mut numbers, of_points, both_sides);
+                off.push((told / sent).log2());
+            }
+            off.sort_by(f64::total_cmp);
+            let [low, middle, high] = [6, 30, 53].map(|at| off[at]);
+            assert!(
+                low > -0.25 && middle.abs() < 0.1 && high < 0.25,
+                "{of_points} {both_sides}: {low} {middle} {high}"
+            );
+        }
+    }
+}
+
+/// Of 1500 emitters, of which points send a share of the energy, with energies over four decades: what the cluster's
+/// node tells a point that is not near, and what reaches it.
+fn of_points_and_faces(numbers: &mut Numbers, of_points: f64, both_sides: bool) -> (f64, f64) {
+    let half = DVec3::from_array([(); 3].map(|()| numbers.spread_between(0.1, 1.0)));
+    let distance = half.length() * numbers.spread_between(3.0, 30.0);
+    let point = numbers.within(DVec3::Z, std::f64::consts::PI) * distance;
+    let emitters: Vec<(DVec3, Option<DVec3>, f64)> = (0..1500)
+        .map(|i| {
+            let at = DVec3::from_array([(); 3].map(|()| 2.0 * numbers.next() - 1.0)) * half;
+            let face = numbers.within(DVec3::Z, std::f64::consts::PI);
+            let is_point = i % 2 == 0;
+            let share = if is_point { of_points } else { 1.0 - of_points };
+            (at, (!is_point).then_some(face), share * numbers.spread_between(1e-2, 1e2))
+        })
+        .filter(|&(_, _, energy)| energy > 0.0)
+        .collect();
+    let parts: Vec<LightBounds> = emitters
+        .iter()
+        .map(|&(at, face, energy)| {
+            let cone = face.map_or(Cone::ALL, |n| Cone::flat(n.as_vec3(), both_sides));
+            LightBounds::of_emitter(
+                Aabb::around([at.as_vec3()]),
+                cone,
+                energy as f32,
+                f32::INFINITY,
+            )
+        })
+        .collect();
+    let mut around = LightBounds::around(&parts);
+    // Sheets that emit from both sides have a cone of a hemisphere together.
+    around.cone.theta_o = std::f32::consts::PI;
+    let receiver = Receiver { point: point.as_vec3(), normal: Vec3::ZERO };
+    let told = Node::encode(&around, Link::Emitter(0)).importance(&receiver);
+    let sent = emitters.iter().map(|&(at, face, energy)| {
+        let way = point - at;
+        let cosine = face.map_or(1.0, |face| {
+            let cosine = face.dot(way.normalize());
+            if both_sides { cosine.abs() } else { cosine.max(0.0) }
+        });
+        energy * cosine / way.length_squared()
+    });
+    (told, sent.sum())
 }

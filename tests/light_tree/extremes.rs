@@ -53,7 +53,7 @@ cases! {
 }
 
 fn point(p: Vec3, energy: f32) -> LightBounds {
-    LightBounds { aabb: Aabb::around([p]), cone: Cone::ALL, energy, range_m: f32::INFINITY }
+    LightBounds::of_emitter(Aabb::around([p]), Cone::ALL, energy, f32::INFINITY)
 }
 
 /// A point of the cube from -1 to 1.
@@ -89,7 +89,7 @@ fn plane([u, v, w]: [usize; 3]) -> Vec<LightBounds> {
         let mut max = min;
         (max[u], max[v]) = (min[u] + 1e-3, min[v] + 1e-3);
         let cone = Cone::flat(normal, i.is_multiple_of(2));
-        LightBounds { aabb: Aabb { min, max }, cone, energy: 1.0, range_m: f32::INFINITY }
+        LightBounds::of_emitter(Aabb { min, max }, cone, 1.0, f32::INFINITY)
     };
     (0..4096).map(face).collect()
 }
@@ -108,7 +108,7 @@ fn degenerate() -> Vec<LightBounds> {
         let area_normal = (b - a).cross(c - a);
         let cone = Cone::flat(area_normal.normalize_or(Vec3::Z), false);
         let energy = (0.5 * area_normal.length()).max(f32::MIN_POSITIVE);
-        LightBounds { aabb: Aabb::around([a, b, c]), cone, energy, range_m: f32::INFINITY }
+        LightBounds::of_emitter(Aabb::around([a, b, c]), cone, energy, f32::INFINITY)
     };
     (0..2000).map(triangle).collect()
 }
@@ -152,7 +152,7 @@ fn around_the_origin() -> Vec<LightBounds> {
             }
         };
         let cone = if i % 3 == 2 { Cone::flat(Vec3::Z, false) } else { Cone::ALL };
-        LightBounds { aabb, cone, energy: 1.0, range_m: f32::INFINITY }
+        LightBounds::of_emitter(aabb, cone, 1.0, f32::INFINITY)
     };
     (0..500).map(light).collect()
 }

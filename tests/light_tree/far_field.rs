@@ -155,11 +155,13 @@ proptest! {
 /// Two lamps in one place that point apart: who stands in one's beam picks that one.
 #[test]
 fn a_beam_is_found_by_who_stands_in_it() {
-    let lamp = |axis: Vec3| LightBounds {
-        aabb: Aabb { min: Vec3::ZERO, max: Vec3::ZERO },
-        cone: Cone { axis, ..Cone::ALL },
-        energy: 1.0,
-        range_m: f32::INFINITY,
+    let lamp = |axis: Vec3| {
+        LightBounds::of_emitter(
+            Aabb { min: Vec3::ZERO, max: Vec3::ZERO },
+            Cone { axis, ..Cone::ALL },
+            1.0,
+            f32::INFINITY,
+        )
     };
     let bounds = vec![lamp(Vec3::X), lamp(Vec3::Z)];
     let beams = Beams { bounds: bounds.clone(), known: 3, sharpness: 30.0, turn: 0.0 };

@@ -11,7 +11,7 @@ use proptest::prelude::*;
 use std::f32::consts::PI;
 
 fn point_light(at: Vec3, energy: f32) -> LightBounds {
-    LightBounds { aabb: Aabb::around([at]), cone: Cone::ALL, energy, range_m: f32::INFINITY }
+    LightBounds::of_emitter(Aabb::around([at]), Cone::ALL, energy, f32::INFINITY)
 }
 
 /// A real surface and the receiver that stands for it.
@@ -75,7 +75,7 @@ proptest! {
         // A sphere of directions seen under a wide angle, at distance 1.
         let center = receiver.receiver.point + receiver.receiver.normal;
         let aabb = Aabb { min: center - radius / 3f32.sqrt(), max: center + radius / 3f32.sqrt() };
-        let bounds = LightBounds { aabb, cone: Cone::ALL, energy: 1.0, range_m: f32::INFINITY };
+        let bounds = LightBounds::of_emitter(aabb, Cone::ALL, 1.0, f32::INFINITY);
         let node = Node::encode(&bounds, Link::Emitter(0));
         let solid_angle = 2.0 * PI * (1.0 - (1.0 - radius * radius).sqrt());
         let white = 1.0 + PI / solid_angle;

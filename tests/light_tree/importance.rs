@@ -36,7 +36,8 @@ proptest! {
         bounds in emitters(60), receiver in receiver(), round in any::<bool>()
     ) {
         // A group of lights that send light everywhere is weighed in a way of its own.
-        let round = |bounds| if round { LightBounds { cone: Cone::ALL, ..bounds } } else { bounds };
+        let of_all = |own: LightBounds| LightBounds { cone: Cone::ALL, ..own };
+        let round = |own| if round { of_all(own) } else { own };
         let bounds: Vec<_> = bounds.into_iter().map(round).collect();
         for group in tree_over(&bounds).groups() {
             let weights = group.importances(&receiver);
@@ -71,12 +72,12 @@ proptest! {
 
 #[test]
 fn a_point_obeys_the_inverse_square_and_the_cosine() {
-    let bounds = LightBounds {
-        aabb: candelabra::bounds::Aabb::around([Vec3::new(0.0, 0.0, 2.0)]),
-        cone: candelabra::bounds::Cone::ALL,
-        energy: 8.0,
-        range_m: f32::INFINITY,
-    };
+    let bounds = LightBounds::of_emitter(
+        candelabra::bounds::Aabb::around([Vec3::new(0.0, 0.0, 2.0)]),
+        candelabra::bounds::Cone::ALL,
+        8.0,
+        f32::INFINITY,
+    );
     let node = Node::encode(&bounds, Link::Emitter(0));
     let facing = Receiver { point: Vec3::ZERO, normal: Vec3::Z };
     assert!((node.importance(&facing) - 2.0).abs() < 1e-6);
@@ -96,7 +97,7 @@ fn a_lamp_within_reach_at_the_face_of_a_large_box_is_not_called_out_of_range() {
         let size = 2f32.powi(exponent);
         let aabb = Aabb { min: Vec3::new(-2.0 * size, 0.0, 0.0), max: Vec3::ZERO };
         let range_m = 0.8 * f32::EPSILON * size;
-        let bounds = LightBounds { aabb, cone: Cone::ALL, energy: 1.0, range_m };
+        let bounds = LightBounds::of_emitter(aabb, Cone::ALL, 1.0, range_m);
         let node = Node::encode(&bounds, Link::Emitter(0));
         let near = Vec3::X * 0.75 * f32::EPSILON * size;
         let reached = node.importance(&Receiver { point: near, normal: Vec3::ZERO });
@@ -120,7 +121,7 @@ fn light_at_the_very_edge_is_not_called_dark() {
         let theta_o = if step % 3 == 0 { 0.0 } else { 3.0 * random(1) };
         let cone = Cone { theta_o: theta_o as f32, ..Cone::flat(Vec3::Y, false) };
         let aabb = Aabb { min: -half, max: half };
-        let bounds = LightBounds { aabb, cone, energy: 1.0, range_m: f32::INFINITY };
+        let bounds = LightBounds::of_emitter(aabb, cone, 1.0, f32::INFINITY);
         let node = Node::encode(&bounds, Link::Emitter(0));
         // What sampling sees, exactly.
         let bounds = node.bounds();

@@ -61,16 +61,16 @@ pub fn scattered(count: u32, seed: u32, two_sided: bool) -> Vec<LightBounds> {
         let vector = |n: u32| Vec3::new(random(n), random(n + 1), random(n + 2)) * 2.0 - 1.0;
         let place = vector(0) * Vec3::new(1.0, 0.6, 0.35);
         let size = vector(3).abs() * 0.02;
-        LightBounds {
-            aabb: Aabb { min: place - size, max: place + size },
-            cone: match i % 8 {
+        LightBounds::of_emitter(
+            Aabb { min: place - size, max: place + size },
+            match i % 8 {
                 0 | 4 => Cone::ALL,
                 1 => Cone::flat(vector(6).normalize(), two_sided),
                 _ => Cone::flat(vector(6).normalize(), false),
             },
-            energy: 0.5 + random(9),
-            range_m: f32::INFINITY,
-        }
+            0.5 + random(9),
+            f32::INFINITY,
+        )
     };
     (0..count).map(light).collect()
 }

@@ -166,12 +166,7 @@ proptest! {
         places in prop::collection::vec((-1f32..1.0, -1f32..1.0, -1f32..1.0, -6f32..6.0), 1..200),
         links in prop::collection::vec(0u32..9, 200), lit in any::<u64>()
     ) {
-        let point = |&(x, y, z, exponent): &(f32, f32, f32, f32)| LightBounds {
-            aabb: Aabb::around([Vec3::new(x, y, z)]),
-            cone: Cone::ALL,
-            energy: 10f32.powf(exponent),
-            range_m: f32::INFINITY,
-        };
+        let point = |&(x, y, z, exponent): &(f32, f32, f32, f32)| LightBounds::of_emitter(Aabb::around([Vec3::new(x, y, z)]), Cone::ALL, 10f32.powf(exponent), f32::INFINITY);
         let bounds: Vec<_> = places.iter().map(point).collect();
         let links = numbered(links.into_iter().take(bounds.len()));
         let tree = linked_tree(&bounds, &links);
@@ -268,11 +263,13 @@ proptest! {
 
 /// A row of points.
 fn row(count: usize, energy: impl Fn(usize) -> f32) -> Vec<LightBounds> {
-    let point = |i: usize| LightBounds {
-        aabb: Aabb::around([Vec3::new(i as f32, 1.0, 0.0)]),
-        cone: Cone::ALL,
-        energy: energy(i),
-        range_m: f32::INFINITY,
+    let point = |i: usize| {
+        LightBounds::of_emitter(
+            Aabb::around([Vec3::new(i as f32, 1.0, 0.0)]),
+            Cone::ALL,
+            energy(i),
+            f32::INFINITY,
+        )
     };
     (0..count).map(point).collect()
 }
@@ -371,10 +368,8 @@ fn links_are_in_the_file_only_if_there_are_any() {
     assert_eq!(bytemuck::bytes_of(&without.trees()[0]), bytemuck::bytes_of(&with.trees()[0]));
     let groups = |tree: &Tree| bytemuck::cast_slice::<_, u8>(tree.groups()).to_vec();
     assert_eq!(groups(&without), groups(&with));
-    let minor = |tree: Tree| tree.into_bytes().as_ref()[10];
     assert_ne!(with.digest_at(0), without.digest_at(0));
     assert_ne!(with.digest_at(0), linked_tree(&bounds, &[0, 1, 1, 1, 0]).digest_at(0));
-    assert_eq!((minor(without), minor(with)), (2, 3));
 }
 
 #[test]
@@ -396,11 +391,13 @@ fn what_is_not_linked_draws_no_picks() {
         Vec3::new((1.7 * t).sin(), 0.3 + 0.2 * (2.9 * t).cos(), (0.6 * t).cos())
     };
     let bounds = |strong: bool| -> (Vec<LightBounds>, Vec<u32>) {
-        let point = |i: usize| LightBounds {
-            aabb: Aabb::around([place(i)]),
-            cone: Cone::ALL,
-            energy: if i.is_multiple_of(10) { 1e6 } else { 1.0 + (i % 3) as f32 },
-            range_m: f32::INFINITY,
+        let point = |i: usize| {
+            LightBounds::of_emitter(
+                Aabb::around([place(i)]),
+                Cone::ALL,
+                if i.is_multiple_of(10) { 1e6 } else { 1.0 + (i % 3) as f32 },
+                f32::INFINITY,
+            )
         };
         let all = (0..400usize).filter(|i| strong || !i.is_multiple_of(10));
         all.map(|i| (point(i), if i.is_multiple_of(10) { 1 } else { 2 })).unzip()

@@ -74,12 +74,12 @@ fn the_axes_are_equals() {
             let t = i as f32;
             let p = Vec3::new((t * 1.3).sin(), (t * 0.7).cos(), (t * 2.1).sin() * 0.5);
             let axis = Vec3::new((t * 0.9).cos(), (t * 1.7).sin(), 0.3).normalize();
-            LightBounds {
-                aabb: Aabb::around([p, p + Vec3::splat(0.01)]),
-                cone: candelabra::bounds::Cone::flat(axis, false),
-                energy: 1.0 + t.sin().abs(),
-                range_m: f32::INFINITY,
-            }
+            LightBounds::of_emitter(
+                Aabb::around([p, p + Vec3::splat(0.01)]),
+                candelabra::bounds::Cone::flat(axis, false),
+                1.0 + t.sin().abs(),
+                f32::INFINITY,
+            )
         })
         .collect();
     let receiver = Receiver { point: Vec3::new(0.2, -1.5, 0.4), normal: Vec3::Y };
@@ -108,12 +108,12 @@ fn the_axes_are_equals() {
 #[test]
 fn the_ends_of_the_random_number_are_safe() {
     let bounds = vec![
-        LightBounds {
-            aabb: Aabb::around([Quat::from_rotation_y(0.3) * Vec3::X]),
-            cone: candelabra::bounds::Cone::ALL,
-            energy: 1.0,
-            range_m: f32::INFINITY,
-        };
+        LightBounds::of_emitter(
+            Aabb::around([Quat::from_rotation_y(0.3) * Vec3::X]),
+            candelabra::bounds::Cone::ALL,
+            1.0,
+            f32::INFINITY
+        );
         1000
     ];
     let receiver = Receiver { point: Vec3::ZERO, normal: Vec3::X };
@@ -130,11 +130,13 @@ fn the_ends_of_the_random_number_are_safe() {
 #[test]
 fn deep_trees_keep_their_probabilities() {
     let bounds: Vec<LightBounds> = (0..30)
-        .map(|i| LightBounds {
-            aabb: Aabb::around([Vec3::X * 10f32.powi(i - 15)]),
-            cone: candelabra::bounds::Cone::ALL,
-            energy: 10f32.powi(2 * (i - 15)),
-            range_m: f32::INFINITY,
+        .map(|i| {
+            LightBounds::of_emitter(
+                Aabb::around([Vec3::X * 10f32.powi(i - 15)]),
+                candelabra::bounds::Cone::ALL,
+                10f32.powi(2 * (i - 15)),
+                f32::INFINITY,
+            )
         })
         .collect();
     let receiver = Receiver { point: Vec3::ZERO, normal: Vec3::X };

@@ -357,12 +357,12 @@ fn a_hard_decision_leaves_seams() {
     let bounds: Vec<LightBounds> = (0..64)
         .map(|i| {
             let p = Vec3::new((i % 8) as f32, (i / 8) as f32, 0.0) / 8.0;
-            LightBounds {
-                aabb: candelabra::bounds::Aabb::around([p]),
-                cone: Cone::ALL,
-                energy: 1.0,
-                range_m: f32::INFINITY,
-            }
+            LightBounds::of_emitter(
+                candelabra::bounds::Aabb::around([p]),
+                Cone::ALL,
+                1.0,
+                f32::INFINITY,
+            )
         })
         .collect();
     let from = Receiver { point: Vec3::new(0.3, 0.4, 0.1), normal: Vec3::ZERO };

@@ -60,8 +60,9 @@ pub fn emitter() -> impl Strategy<Value = LightBounds> {
     let sphere =
         (position(), 0.001f32..0.2).prop_map(|(p, r)| (Aabb { min: p - r, max: p + r }, Cone::ALL));
     let range = prop_oneof![4 => Just(f32::INFINITY), 1 => 0.05f32..5.0];
-    (prop_oneof![3 => triangle, 1 => point, 1 => spot, 1 => sphere], energy, range)
-        .prop_map(|((aabb, cone), energy, range_m)| LightBounds { aabb, cone, energy, range_m })
+    (prop_oneof![3 => triangle, 1 => point, 1 => spot, 1 => sphere], energy, range).prop_map(
+        |((aabb, cone), energy, range_m)| LightBounds::of_emitter(aabb, cone, energy, range_m),
+    )
 }
 
 pub fn emitters(most: usize) -> impl Strategy<Value = Vec<LightBounds>> {

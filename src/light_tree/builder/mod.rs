@@ -31,7 +31,7 @@ use reuse::{Found, Reuse};
 use saoh::Halves;
 
 /// Changes whenever the same bounds would give other bytes: part of every fingerprint.
-pub const ALGORITHM_VERSION: u32 = 5;
+pub const ALGORITHM_VERSION: u32 = 6;
 
 /// Below this depth clusters are cut by count: no input makes the recursion much deeper.
 const DEEPEST_BY_COST: usize = 100;
@@ -270,7 +270,7 @@ mod tests {
         // A cut by cost parts the last of these from all others.
         let light = |i: i32| {
             let aabb = Aabb::around([Vec3::X * 4f32.powi(i)]);
-            LightBounds { aabb, cone: Cone::ALL, energy: 1.0, range_m: f32::INFINITY }
+            LightBounds::of_emitter(aabb, Cone::ALL, 1.0, f32::INFINITY)
         };
         let bounds: Vec<_> = (-30..30).map(light).collect();
         let items = Items::new(&bounds);

@@ -14,9 +14,9 @@ pub fn of(bounds: &[LightBounds]) -> impl Fn(u32, u32) -> Ordering + Sync {
 /// A total order over every number of the bounds.
 pub fn by_numbers(a: &LightBounds, b: &LightBounds) -> Ordering {
     let numbers = |bounds: &LightBounds| {
-        let LightBounds { aabb, cone, energy, range_m } = *bounds;
+        let LightBounds { aabb, cone, energy, share, range_m } = *bounds;
         let vectors = [aabb.min, aabb.max, cone.axis].map(|v| v.to_array());
-        (vectors, [cone.theta_o, cone.theta_e, energy, range_m], cone.two_sided)
+        (vectors, [cone.theta_o, cone.theta_e, energy, share, range_m], cone.two_sided)
     };
     let ((va, sa, ta), (vb, sb, tb)) = (numbers(a), numbers(b));
     let pairs = va.as_flattened().iter().zip(vb.as_flattened()).chain(sa.iter().zip(&sb));

@@ -313,11 +313,13 @@ mod tests {
     /// So many point lights in a row.
     fn row_of(count: u32) -> LightTree<AlignedBytes> {
         let bounds: Vec<LightBounds> = (0..count)
-            .map(|i| LightBounds {
-                aabb: Aabb { min: i as f32 * Vec3::X, max: i as f32 * Vec3::X },
-                cone: Cone::ALL,
-                energy: 1.0,
-                range_m: f32::INFINITY,
+            .map(|i| {
+                LightBounds::of_emitter(
+                    Aabb { min: i as f32 * Vec3::X, max: i as f32 * Vec3::X },
+                    Cone::ALL,
+                    1.0,
+                    f32::INFINITY,
+                )
             })
             .collect();
         let mut writer = LightTreeWriter::default();

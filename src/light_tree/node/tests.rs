@@ -18,7 +18,7 @@ fn any_bounds() -> impl Strategy<Value = LightBounds> {
         |(p, far, extent, size, cone, energy, range_m)| {
             let min = p * far;
             let aabb = Aabb { min, max: min + extent * size };
-            LightBounds { aabb, cone, energy, range_m }
+            LightBounds::of_emitter(aabb, cone, energy, range_m)
         },
     )
 }
@@ -29,7 +29,7 @@ fn of_every_direction_the_sine_is_one() {
         assert_eq!(is_round(code), decode_sin_half_theta_o(code) >= 1.0, "{code}");
     }
     let everywhere = Aabb::around([Vec3::ONE]);
-    let everywhere = LightBounds { aabb: everywhere, cone: Cone::ALL, energy: 1.0, range_m: 1.0 };
+    let everywhere = LightBounds::of_emitter(everywhere, Cone::ALL, 1.0, 1.0);
     assert!(is_round(Node::encode(&everywhere, Link::Emitter(0)).theta_o));
 }
 
@@ -42,6 +42,10 @@ proptest! {
         let needed = (tilt + bounds.cone.theta_o).min(PI);
         prop_assert!(decoded.cone.theta_o >= needed - 2e-6);
         prop_assert!(decoded.cone.theta_e >= bounds.cone.theta_e - 1e-6);
+        // The share is kept to a step of its root where normals point everywhere; elsewhere it follows from theta_e.
+        let of_all = decoded.cone.theta_o >= PI;
+        let told = if of_all { bounds.share } else { Cone { theta_o: 0.0, ..bounds.cone }.share() };
+        prop_assert!((decoded.share.sqrt() - told.sqrt()).abs() < 0.011, "{} {told}", decoded.share);
         prop_assert_eq!(decoded.energy, bounds.energy);
         prop_assert!(decoded.range_m >= bounds.range_m);
         let close = decoded.range_m <= bounds.range_m * 1.2;
@@ -61,12 +65,12 @@ proptest! {
 
 #[test]
 fn what_is_exact_stays_exact() {
-    let bounds = LightBounds {
-        aabb: Aabb { min: Vec3::splat(1e7), max: Vec3::splat(1e7) },
-        cone: Cone::flat(Vec3::Y, true),
-        energy: 2.0,
-        range_m: f32::INFINITY,
-    };
+    let bounds = LightBounds::of_emitter(
+        Aabb { min: Vec3::splat(1e7), max: Vec3::splat(1e7) },
+        Cone::flat(Vec3::Y, true),
+        2.0,
+        f32::INFINITY,
+    );
     assert_eq!(Node::encode(&bounds, Link::Emitter(0)).bounds(), bounds);
     let all = LightBounds { cone: Cone::ALL, ..bounds };
     assert_eq!(Node::encode(&all, Link::Emitter(0)).bounds().cone, Cone::ALL);

@@ -39,7 +39,7 @@ rules! {
     ENERGY_IS_POSITIVE = "its energy is finite and more than 0";
     AXIS_IS_IN_RANGE = "no part of its axis is -32768";
     BOX_IS_IN_PARENT = "its box lies inside its parent's";
-    EMISSION_IS_IN_PARENT = "its theta_e is not beyond its parent's, nor is it two-sided alone";
+    EMISSION_IS_IN_PARENT = "its theta_e is not beyond its parent's, unless the parent's theta_o is pi, nor is it two-sided alone";
     RANGE_IS_IN_PARENT = "its range is not beyond its parent's";
     CONE_IS_IN_PARENT = "its cone lies inside its parent's";
     ENERGIES_ADD_UP = "the energies of its lanes add up to its parent's, to 1e-6";
