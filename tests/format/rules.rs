@@ -171,7 +171,10 @@ fn groups(cases: &mut Cases) {
         p.set("GRUP", emitter.at(0, 4), 1e3_f32.to_bits());
     });
     let first = Lane { group: emitter.group, lane: 0 };
-    cases.breaks("GRUP 8", first.record(), |p| p.section("TREE")[48 * 5 + 16 + 26] = 0);
+    // Where normals point everywhere, the byte of theta_e means something else.
+    cases.breaks("GRUP 8", first.record(), |p| {
+        p.section("TREE")[48 * 5 + 16 + 24..][..3].copy_from_slice(&[0xfe, 0x7f, 0]);
+    });
     let below = Lane { group: inner.group + 1, lane: 0 };
     cases.breaks("GRUP 9", below.record(), |p| {
         p.section("GRUP")[inner.at(RANGE, 1)] = 100;

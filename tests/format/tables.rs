@@ -179,7 +179,7 @@ fn later_files_are_read_as_far_as_they_can_be() {
     assert_eq!(
         with(&|parts| {
             spare(parts);
-            parts.version = [1, 4];
+            parts.version = [1, 5];
         }),
         Ok(())
     );
