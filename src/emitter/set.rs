@@ -317,7 +317,7 @@ fn mesh_entries(
         let (moves, varies) =
             (moving[instance.node as usize], instance.values.as_ref().is_some_and(Keys::varies));
         let is_shared = users[mesh_light as usize] > 1 || moves || varies;
-        let is_placed = !deforms && !(moves && is_blurred) && keeps_shapes(instance.node);
+        let is_placed = !(deforms || (moves && is_blurred)) && keeps_shapes(instance.node);
         Some(LightEntry {
             path: instance.path.clone(),
             source: LightSource::Mesh { instance: i as u32, mesh_light },

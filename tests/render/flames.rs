@@ -10,7 +10,7 @@ use crate::statistics::Estimate;
 use crate::strategies::{SIZE, disagreement, render};
 use candelabra::emitter::{Emitters, PosedEmitters};
 use candelabra::light_tree::{LightRow, LightTree, Receiver, TreeKind};
-use candelabra::pipeline::{self, ShotTrees, TreeFile};
+use candelabra::pipeline::{self, ShotTrees, Standing, TreeFile};
 use candelabra::render::buffers::RenderBuffers;
 use candelabra::render::{LightStrategy, RenderSettings};
 use candelabra::scene::{Deformation, Keys, LightKind, Material, Mesh, Scene, Shaping, Shutter};
@@ -353,6 +353,8 @@ fn a_frame_a_process_is_the_shot_in_one() {
         let emitters = Emitters::collect(&scene);
         let tree = tree_of(&scene, &SHOT);
         tree.verify().unwrap();
+        let survey = pipeline::survey(&scene, &emitters, &SHOT).unwrap();
+        assert_eq!(pipeline::standing(&tree, &survey), Standing::UpToDate);
         let whole = SHOT.map(|frame| tree.digest_at(frame).unwrap());
         assert!(whole.windows(2).all(|pair| pair[0] != pair[1]));
         for (frame, told) in SHOT.into_iter().zip(whole) {

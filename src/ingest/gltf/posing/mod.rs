@@ -174,7 +174,7 @@ impl Poses {
             None => weights::constant(&weights),
         };
         let skin = bound.map(|bound| bound.skin);
-        let deformation = deforms.then(|| Deformation { rest, targets, weights, skin });
+        let deformation = deforms.then_some(Deformation { rest, targets, weights, skin });
         Ok(Posed { hung, deformation })
     }
 }
