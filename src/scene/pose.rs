@@ -136,6 +136,7 @@ impl Pose {
     }
 
     /// The positions of a mesh, which may deform, in its own space, metres.
+    #[inline]
     pub fn positions<'a>(&'a self, scene: &'a Scene, mesh: u32) -> &'a [Vec3] {
         let shape = self.shape(scene, mesh);
         shape.map_or(&scene.meshes[mesh as usize].positions, |shape| &shape.positions)

@@ -12,7 +12,7 @@ use candelabra::emitter::{Emitters, PosedEmitters};
 use candelabra::light_tree::{LightRow, LightTree, Receiver, TreeKind};
 use candelabra::pipeline::{self, ShotTrees, Standing, TreeFile};
 use candelabra::render::buffers::RenderBuffers;
-use candelabra::render::{LightStrategy, RenderSettings};
+use candelabra::render::{LightStrategy, RenderSettings, Split};
 use candelabra::scene::{Deformation, Keys, LightKind, Material, Mesh, Scene, Shaping, Shutter};
 use candelabra::store::AlignedBytes;
 use glam::{DVec3, Vec2, Vec3};
@@ -94,7 +94,12 @@ fn every_frame_is_lit_by_the_shapes_of_its_moment() {
         // One varies still.
         let still = Set::of(&still, &SHOT);
         assert!(still.emitters.lights().iter().all(|light| !light.deforms));
+        let alone = by(LightStrategy::Tree, false, &settings(LightStrategy::Tree, 60));
+        let split = Split::Fixed(0.5);
+        let several = RenderSettings { split, ..settings(LightStrategy::Tree, 70) };
         for (what, other) in [
+            ("without reflected rays", render(&set, alone, frame)),
+            ("by several lights", render(&set, several, frame)),
             ("uniformly", render(&set, settings(LightStrategy::Uniform, 20), frame)),
             ("exhaustively", render(&set, settings(LightStrategy::Exhaustive, 30), frame)),
             ("by power", render(&set, settings(LightStrategy::Power, 40), frame)),
