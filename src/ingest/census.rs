@@ -68,8 +68,12 @@ pub(super) fn check(scene: &Scene) -> Result<(), Fault> {
 mod tests {
     use super::*;
     use crate::math::color::Rgb;
-    use crate::scene::{Instance, Light, LightKind, Material, Mesh, Node, Trs, Visibility};
+    use crate::scene::{
+        Deformation, Instance, Keys, Light, LightKind, Material, Mesh, Node, Shape, Target, Trs,
+        Visibility,
+    };
     use glam::{DQuat, DVec3};
+    use std::sync::Arc;
 
     /// Instances of one mesh of some triangles that emit.
     fn scene(triangles: usize, instances: usize, scale: DVec3, emission: Rgb) -> Scene {
@@ -111,6 +115,25 @@ mod tests {
         assert_eq!(check((1 << 12) + (1 << 7), DVec3::ONE, Rgb::ZERO), Ok(()));
         assert_eq!(check(60, uneven, Rgb::ONE), Ok(()));
         assert!(check(100, uneven, Rgb::ONE).unwrap_err().contains("stretched"));
+        // What deforms is written out too, however it is scaled; what could and never does is not.
+        for (keys, emission, is_refused) in
+            [(2, Rgb::ONE, true), (1, Rgb::ONE, false), (2, Rgb::ZERO, false)]
+        {
+            let mut scene = scene(1 << 20, 100, DVec3::ONE, emission);
+            let (times_s, values) = (vec![0.0, 1.0], vec![Rgb::ZERO, Rgb::X]);
+            let weights = Keys {
+                times_s: times_s[..keys].into(),
+                values: values[..keys].into(),
+                interpolation: Default::default(),
+            };
+            scene.meshes[0].deformation = Some(Arc::new(Deformation {
+                rest: Shape::default(),
+                targets: vec![Target::default()],
+                weights: [weights].into(),
+                skin: None,
+            }));
+            assert_eq!(super::check(&scene).is_err(), is_refused, "{keys} {emission}");
+        }
     }
 
     #[test]
