@@ -177,7 +177,7 @@ class LightCarriers:
     ) -> None:
         rgb = light.rgb
         if np.any(light.normalize):
-            area = _each_frame(world, mesh.area)
+            area = _each_frame(world, mesh.area) if mesh.motion is None else self._areas(world, mesh)
             if np.max(area) <= 0.0:
                 self.report.warn(light.path, f"{light.type} emits nothing", "it has no area")
             rgb = _settled(self._writable(light, self._normalized(light.rgb, light.normalize, area)))
@@ -189,10 +189,20 @@ class LightCarriers:
             mesh.report_still_glow(self.report)
         lit = mesh.lit_primitives(self.materials, light, Emission(self._first(rgb), varies=rgb.ndim == 2))
         if rgb.ndim == 2 and lit:
-            grown = keys_of_growth(self.frames, light.normalize, world, mesh.area, rgb)
+            grown = {}
+            if mesh.motion is None:
+                grown = keys_of_growth(self.frames, light.normalize, world, mesh.area, rgb)
             glow = np.array(mesh.pieces_lit(light.material_sync)[0].glow)
             self._animated(extras, rgb * glow, {code: row * glow for code, row in grown.items()})
-        node["mesh"] = self.document.shared("meshes", {"name": mesh.name, "primitives": lit})
+        body = {"name": mesh.name, "primitives": lit}
+        if mesh.motion is not None:
+            body["extras"] = {"targetNames": mesh.motion.names}
+        node["mesh"] = self.document.shared("meshes", body)
+
+    def _areas(self, world: np.ndarray, mesh: MeshSource) -> np.ndarray:
+        """The area of a mesh that deforms, at each frame."""
+        matrices = np.broadcast_to(world, (len(self.frames.codes), 4, 4))
+        return np.array([mesh.area(matrix[:3, :3], code) for matrix, code in zip(matrices, self.frames.codes, strict=True)])
 
     # -- lights without area ---------------------------------------------------------------------
 

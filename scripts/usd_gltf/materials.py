@@ -58,11 +58,6 @@ class Look:
     glow_is_known: bool = False
     """Whether `emission` is what the bound material says (no material says nothing)."""
 
-    @property
-    def emits(self) -> bool:
-        """Whether it glows at any time."""
-        return any(self.emission) or self.emission_keys is not None
-
 
 class Materials:
     """Resolves bindings to looks, and looks to glTF materials."""

@@ -4,8 +4,7 @@ A mesh is cut into pieces, one for each material (GeomSubset). Corners with equa
 texture coordinates and colour share a vertex. Texture coordinates are turned over: USD's v runs up
 from the image's last row, glTF's down from its first.
 
-A mesh that deforms has morph targets (`deformation`). What emits light keeps the shape of the first frame: its
-triangles are lights of the tree.
+A mesh that deforms has morph targets (`deformation`), whether it emits light or not.
 
 A subdivision surface is refined (`subdivision`); at complexity low its cage is exported, with smooth normals
 (weighted by area) if it has none of its own, and reported. A polygon mesh without normals has none in glTF
@@ -36,6 +35,8 @@ from .subdivision import Subdivider, Surface
 from .triangulate import triangulate
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     from .linking import LinkSubsets
 
 GLOW = "materialGlowTintsLight"
@@ -85,10 +86,13 @@ class MeshSource:
     triangles: np.ndarray
     motion: Motion | None = None
     """How it deforms: over the targets of its pieces' primitives."""
+    points_at: Callable[[float], np.ndarray] | None = None
+    """The points at a time code, if it deforms."""
 
-    def area(self, linear: np.ndarray) -> float:
-        """World-space surface area (one side) under the linear part of a transform."""
-        corners = (self.points @ linear.T)[self.triangles]
+    def area(self, linear: np.ndarray, code: float | None = None) -> float:
+        """World-space surface area (one side) under the linear part of a transform, at the first frame or another."""
+        points = self.points if code is None or self.points_at is None else self.points_at(code)
+        corners = (points @ linear.T)[self.triangles]
         cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         return float(np.linalg.norm(cross, axis=1).sum() / 2)
 
@@ -161,8 +165,8 @@ class MeshReader:
         self.link_subsets: LinkSubsets | None = None
         """Subsets that light links divide meshes by, besides materials."""
 
-    def read(self, prim: Usd.Prim, is_light: bool) -> MeshSource | None:
-        """The mesh of a Mesh or an intrinsic gprim, which may be a light; None (reported) if it has no faces."""
+    def read(self, prim: Usd.Prim) -> MeshSource | None:
+        """The mesh of a Mesh or an intrinsic gprim; None (reported) if it has no faces."""
         subsets = _material_subsets(prim)
         if self.link_subsets is not None:
             subsets += self.link_subsets.of(prim, subsets)
@@ -171,10 +175,9 @@ class MeshReader:
         source = prim.GetPrimInPrototype() if prim.IsInstanceProxy() else prim
         names = tuple(subset.GetName() for subset in subsets)
         looks = tuple(look.path for look in bound)
-        emits = is_light or any(look.emits for look in bound)
-        key = (source.GetPath(), looks, color, names, self.skinning.name(prim), emits and self.polygons.may_deform(prim))
+        key = (source.GetPath(), looks, color, names, self.skinning.name(prim))
         if key not in self._read:
-            self._read[key] = self._build(prim, subsets, bound, emits)
+            self._read[key] = self._build(prim, subsets, bound)
         return self._read[key]
 
     @staticmethod
@@ -187,10 +190,8 @@ class MeshReader:
         found = [api.FindPrimvarWithInheritance(name) for name in names]
         return " ".join(str(p.Get()) for p in found if p and p.GetAttr().GetPrim() != prim)
 
-    def _build(
-        self, prim: Usd.Prim, subsets: list[UsdGeom.Subset], bound: list[Look], emits: bool
-    ) -> MeshSource | None:
-        polygons = self.polygons.first(prim, emits)
+    def _build(self, prim: Usd.Prim, subsets: list[UsdGeom.Subset], bound: list[Look]) -> MeshSource | None:
+        polygons = self.polygons.first(prim)
         if polygons is None:
             return None
         points, counts, corners, normals = polygons.points, polygons.counts, polygons.corners, polygons.normals
@@ -244,7 +245,19 @@ class MeshReader:
         self.report.count("meshes")
         self.report.count("triangles", len(triangles))
         motion = self._motion(authored, polygons, parts, corners, triangles, smooth) if polygons.deforms else None
-        return MeshSource(str(prim.GetPath()), prim.GetName(), pieces, points, corners[triangles], motion)
+        points_at = (lambda code: self._posed(authored, polygons, code)[0]) if motion is not None else None
+        return MeshSource(str(prim.GetPath()), prim.GetName(), pieces, points, corners[triangles], motion, points_at)
+
+    def _posed(
+        self, mesh: Authored, polygons: Polygons, code: float
+    ) -> tuple[np.ndarray, CornerValues | None]:
+        """Points and normals of the surface of a mesh that deforms."""
+        points, normals = self.polygons.at(mesh.prim, code, polygons)
+        points = np.where(np.isfinite(points), points, 0.0)
+        if mesh.surface is not None:
+            points, own = mesh.surface.shape(points)
+            normals = own or (normals and mesh.surface.carry(normals))
+        return points, normals
 
     def _motion(
         self,
@@ -260,11 +273,7 @@ class MeshReader:
 
         def shape(code: float) -> np.ndarray:
             """Points and normals of all vertices, made as those of the first frame are."""
-            points, normals = self.polygons.at(mesh.prim, code, polygons)
-            points = np.where(np.isfinite(points), points, 0.0)
-            if mesh.surface is not None:
-                points, own = mesh.surface.shape(points)
-                normals = own or (normals and mesh.surface.carry(normals))
+            points, normals = self._posed(mesh, polygons, code)
             normals = _finished(normals, smooth, points, corners, triangles)
             rows = [points[corners[corner]]]
             if normals is not None:

@@ -86,15 +86,15 @@ class NodeWriter:
             node["extras"]["usdLux"].update(self.linking.light(prim))
         elif mesh is not None:
             node["mesh"] = self._mesh(mesh)
-            if mesh.motion is not None:
-                mesh.motion.animate(self.document, index)
-                self.report.count("animation channels")
             keys = prim.mesh.glow_keys()
             if keys is not None:
                 values = strength_keys(self.frames, keys)
                 node["extras"]["usdLux"] = {"type": "MeshLight", "inputs": {}, "values": values}
             else:
                 prim.mesh.report_still_glow(self.report.about("lights"))
+        if mesh is not None and mesh.motion is not None:
+            mesh.motion.animate(self.document, index)
+            self.report.count("animation channels")
         children = [self._prim(child, path + child.path[len(prim.path) :], world, chain) for child in prim.children]
         for prototype, placements in prim.instances:
             children += self._instances(prototype, placements, path, world, (prim.path, *chain))

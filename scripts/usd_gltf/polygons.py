@@ -44,9 +44,8 @@ class PolygonReader:
     def __init__(self, skinning: Skinning, frames: Frames, report: Notebook) -> None:
         self.skinning, self.frames, self.report = skinning, frames, report
 
-    def first(self, prim: Usd.Prim, emits: bool) -> Polygons | None:
-        """The polygons at the first frame; None (reported) if they make no mesh. Those of what `emits` light
-        deform in no carrier."""
+    def first(self, prim: Usd.Prim) -> Polygons | None:
+        """The polygons at the first frame; None (reported) if they make no mesh."""
         code, is_gprim = self.frames.first, prim.GetTypeName() in gprims.TYPES
         found = self._gprim(prim, code) if is_gprim else self._mesh(prim)
         if found is None:
@@ -59,7 +58,7 @@ class PolygonReader:
             found.changed.append("skinned mesh that deforms")
         if found.changed:
             found.points, _ = self._pose(prim, authored, corners, None)
-            found.deforms = self._is_carried(prim, found, changed, emits)
+            found.deforms = self._is_carried(prim, found, changed)
         normals = self._normals(prim, code, found)
         found.points, found.normals = self._pose(prim, authored, corners, normals)
         if found.deforms and normals is not None:
@@ -70,12 +69,6 @@ class PolygonReader:
             except Unlike as why:
                 self.lose(prim, found, why)
         return found
-
-    def may_deform(self, prim: Usd.Prim) -> bool:
-        """Whether something that decides the mesh's shape depends on the time."""
-        if prim.GetTypeName() in gprims.TYPES:
-            return any(changes(prim.GetAttribute(name), self.frames) for name in gprims.SIZES)
-        return changes(prim.GetAttribute("points"), self.frames) or self.skinning.may_deform(prim)
 
     def at(self, prim: Usd.Prim, code: float, first: Polygons) -> tuple[np.ndarray, CornerValues | None]:
         """Points (v, 3) of a mesh that deforms, and normals if `first` has any, at another time. Raises Unlike."""
@@ -95,19 +88,15 @@ class PolygonReader:
             kept = f"{why}; {shape} of frame {self.frames.first:g} is used"
             self.report.about("animation").warn(prim.GetPath(), what, kept)
 
-    def _is_carried(self, prim: Usd.Prim, found: Polygons, changed: list[str], emits: bool) -> bool:
+    def _is_carried(self, prim: Usd.Prim, found: Polygons, changed: list[str]) -> bool:
         """Whether a mesh that may deform does, and can be carried; reported if it cannot."""
         try:
             if any(name in _TOPOLOGY for name in changed):
                 raise Unlike("topology that changes has no carrier")
-            if not any(self._moves(prim, code, found) for code in self.frames.codes):
-                return False
-            if emits:
-                raise Unlike("it emits light, and what emits keeps one shape")
+            return any(self._moves(prim, code, found) for code in self.frames.codes)
         except Unlike as why:
             self.lose(prim, found, why)
             return False
-        return True
 
     def _moves(self, prim: Usd.Prim, code: float, found: Polygons) -> bool:
         """Whether points of faces are elsewhere than at the first frame, by more than rounding."""

@@ -169,7 +169,7 @@ class PrimTree:
         if prim.IsA(UsdGeom.Mesh) or kind in gprims.TYPES:
             light_prim = geometry_light or prim
             is_light = light_type(light_prim) is not None
-            compiled.mesh = self.meshes.read(prim, is_light)
+            compiled.mesh = self.meshes.read(prim)
             if compiled.mesh is not None and is_light:
                 compiled.light = self._light(light_prim, "MeshLight")
                 compiled.light_path = str(light_prim.GetPath())

@@ -73,15 +73,18 @@ pub(super) fn differences(
 
 /// Whether two versions differ clearly more in some frame than in the first.
 fn exceeds(apart: &Apart, at_first: &[Difference]) -> bool {
-    let (mut moved, mut in_stops) = (0.0, 0.0);
+    let (mut moved, mut in_stops, mut is_reshaped) = (0.0, 0.0, false);
     for difference in at_first {
         match *difference {
             Difference::Transform { moved_m, .. } => moved = moved_m,
+            Difference::Topology { .. } => is_reshaped = true,
             Difference::Energy { stops, .. } => in_stops = stops.unwrap_or(f32::INFINITY).abs(),
             _ => {}
         }
     }
-    apart.most_moved_m > 1.01 * moved + 1e-4 || apart.most_stops > 1.01 * in_stops + 1e-2
+    apart.most_moved_m > 1.01 * moved + 1e-4
+        || apart.most_stops > 1.01 * in_stops + 1e-2
+        || (apart.reshaped > 0 && !is_reshaped)
 }
 
 fn transform(before: &Described, after: &Described) -> Option<Difference> {

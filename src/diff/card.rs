@@ -46,7 +46,7 @@ pub struct LightCard {
     pub range_m: Option<f32>,
     /// Whether it is left out of all estimates and sampled at every point.
     pub forced: bool,
-    /// Whether it moves or its strength varies with time.
+    /// Whether it moves, deforms or varies in strength with time.
     pub changes: bool,
 }
 

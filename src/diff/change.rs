@@ -140,6 +140,8 @@ pub struct Relinked {
 pub struct Apart {
     /// In how many frames they differ.
     pub frames: u32,
+    /// In how many their shapes differ in their own space, if either deforms.
+    pub reshaped: u32,
     /// How far their places are apart at most, metres.
     pub most_moved_m: f32,
     /// How far their strengths are apart at most, stops; infinite where one is dark.

@@ -104,7 +104,7 @@ impl Light<'_> {
         self.class & property != 0
     }
 
-    /// Whether it moves or its strength varies with time.
+    /// Whether it moves, deforms or varies in strength with time.
     pub fn changes(&self) -> bool {
         self.is(LightRow::CHANGES)
     }

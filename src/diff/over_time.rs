@@ -3,9 +3,10 @@
 use super::change::Apart;
 use super::light::{Light, Row};
 use super::pairs::{Half, Pair};
+use super::profile::shape_of;
 use super::scene_side::SceneSide;
 use crate::bounds::Aabb;
-use crate::emitter::LightSource;
+use crate::emitter::{LightSource, MeshLight};
 use crate::math::color::luminance;
 use crate::scene::Pose;
 use glam::{Affine3A, Vec3, Vec3A};
@@ -14,9 +15,13 @@ use std::collections::{BTreeSet, HashMap};
 
 /// What changes of a light.
 #[derive(Clone, Copy)]
-struct Animated {
+struct Animated<'a> {
     node: u32,
-    /// Middle of its emitters in its own space.
+    /// Of a mesh: what it is an instance of.
+    mesh: Option<&'a MeshLight>,
+    /// Whether that changes its shape.
+    deforms: bool,
+    /// Middle of the mesh in its own space, where it does not.
     middle: Vec3,
     strength: Strength,
 }
@@ -49,12 +54,16 @@ pub(super) fn apart(scenes: [&SceneSide; 2], pairs: &[Pair], shift: Vec3) -> Has
         found.par_iter_mut().zip(&animated).for_each(|(apart, (_, lights))| {
             let [a, mut b] = [0, 1].map(|side| lights[side].at(scenes[side], &poses[side]));
             b.0.translation += Vec3A::from(shift);
-            if a == b {
+            let deforms = lights.iter().any(|light| light.deforms);
+            let shape = |side: usize| lights[side].shape(scenes[side], &poses[side]);
+            let is_reshaped = deforms && shape(0) != shape(1);
+            if a == b && !is_reshaped {
                 return;
             }
             apart.frames += 1;
-            let moved = (a.0.transform_point3(lights[0].middle))
-                .distance(b.0.transform_point3(lights[1].middle));
+            apart.reshaped += u32::from(is_reshaped);
+            let middle = |side: usize| lights[side].middle(scenes[side], &poses[side]);
+            let moved = (a.0.transform_point3(middle(0))).distance(b.0.transform_point3(middle(1)));
             apart.most_moved_m = apart.most_moved_m.max(moved);
             let stops = (luminance(b.1) / luminance(a.1)).log2().abs();
             // Dark in both is no difference.
@@ -64,7 +73,7 @@ pub(super) fn apart(scenes: [&SceneSide; 2], pairs: &[Pair], shift: Vec3) -> Has
     animated.iter().map(|(number, _)| *number).zip(found).collect()
 }
 
-fn animated(side: &SceneSide, light: &Light) -> Animated {
+fn animated<'a>(side: &'a SceneSide, light: &Light) -> Animated<'a> {
     let SceneSide { scene, emitters, .. } = side;
     let source = match light.row {
         Row::Near(row) => emitters.lights()[row as usize].source,
@@ -73,19 +82,25 @@ fn animated(side: &SceneSide, light: &Light) -> Animated {
     match source {
         LightSource::Light(row) => Animated {
             node: scene.lights[row as usize].node,
+            mesh: None,
+            deforms: false,
             middle: Vec3::ZERO,
             strength: Strength::Light(row),
         },
-        LightSource::Mesh { instance, .. } => {
+        LightSource::Mesh { instance, mesh_light } => {
             let row = &scene.instances[instance as usize];
-            let positions = scene.meshes[row.mesh as usize].positions.iter().copied();
-            let middle = Aabb::around(positions).center();
-            Animated { node: row.node, middle, strength: Strength::Instance(instance) }
+            Animated {
+                node: row.node,
+                mesh: Some(&emitters.mesh_lights()[mesh_light as usize]),
+                deforms: scene.changes_shape(row.mesh),
+                middle: middle_of(side.pose.positions(scene, row.mesh)),
+                strength: Strength::Instance(instance),
+            }
         }
     }
 }
 
-impl Animated {
+impl Animated<'_> {
     /// Where it is and how strong.
     fn at(&self, side: &SceneSide, pose: &Pose) -> (Affine3A, Vec3) {
         let rgb = match self.strength {
@@ -94,4 +109,21 @@ impl Animated {
         };
         (pose.world(self.node), rgb)
     }
+
+    /// The hash of its emitters in its own space, if it is a mesh.
+    fn shape(&self, side: &SceneSide, pose: &Pose) -> Option<u128> {
+        self.mesh.map(|mesh| shape_of(side.scene, mesh, pose))
+    }
+
+    /// The middle of its mesh in its own space.
+    fn middle(&self, side: &SceneSide, pose: &Pose) -> Vec3 {
+        match self.mesh.filter(|_| self.deforms) {
+            Some(light) => middle_of(pose.positions(side.scene, light.mesh)),
+            None => self.middle,
+        }
+    }
+}
+
+fn middle_of(positions: &[Vec3]) -> Vec3 {
+    Aabb::around(positions.iter().copied()).center()
 }

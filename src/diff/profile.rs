@@ -11,16 +11,16 @@ use rayon::prelude::*;
 pub(super) struct Profiles {
     /// The hash of the emission texture of each mesh light; 0 without a texture.
     textures: Vec<u128>,
-    /// The hash of the emitters of each mesh light, in its own space.
+    /// The hash of the emitters of each mesh light, in its own space, as they are in one pose.
     shapes: Vec<u128>,
 }
 
 impl Profiles {
-    pub fn of(scene: &Scene, emitters: &Emitters) -> Profiles {
+    pub fn of(scene: &Scene, emitters: &Emitters, pose: &Pose) -> Profiles {
         let rows = emitters.mesh_lights();
         Profiles {
             textures: rows.par_iter().map(|light| texture_on(scene, light)).collect(),
-            shapes: rows.par_iter().map(|light| shape_of(scene, light)).collect(),
+            shapes: rows.par_iter().map(|light| shape_of(scene, light, pose)).collect(),
         }
     }
 
@@ -118,12 +118,14 @@ fn texture_on(scene: &Scene, light: &MeshLight) -> u128 {
     short(&hasher)
 }
 
-fn shape_of(scene: &Scene, light: &MeshLight) -> u128 {
+/// The hash of the emitters of a mesh light in a pose, in its own space.
+pub(super) fn shape_of(scene: &Scene, light: &MeshLight, pose: &Pose) -> u128 {
     let mesh = &scene.meshes[light.mesh as usize];
+    let positions = pose.positions(scene, light.mesh);
     let mut hasher = blake3::Hasher::new();
     for own in 0..light.count {
         let corners = mesh.triangles[light.triangle(own) as usize];
-        hasher.update(bytemuck::bytes_of(&corners.map(|corner| mesh.positions[corner as usize])));
+        hasher.update(bytemuck::bytes_of(&corners.map(|corner| positions[corner as usize])));
     }
     short(&hasher)
 }

@@ -50,7 +50,7 @@ impl<'a> SceneSide<'a> {
         }
         survey.frames.truncate(1);
         let pose = pose_at(scene, frames[0]);
-        let profiles = Profiles::of(scene, &emitters);
+        let profiles = Profiles::of(scene, &emitters, &pose);
         let infinite = infinite::find(scene, &pose, &frames);
         Ok(SceneSide { scene, camera, emitters, survey, frames, pose, profiles, infinite })
     }
@@ -169,9 +169,9 @@ impl<'a> SceneSide<'a> {
         let (node, kind, forced, aabb) = match dark {
             Dark::Mesh(row) => {
                 let instance = &self.scene.instances[row as usize];
-                let mesh = &self.scene.meshes[instance.mesh as usize];
                 let world = self.pose.world(instance.node);
-                let corners = mesh.positions.iter().map(|&p| world.transform_point3(p));
+                let positions = self.pose.positions(self.scene, instance.mesh);
+                let corners = positions.iter().map(|&p| world.transform_point3(p));
                 (instance.node, Kind::Mesh, instance.forced, Aabb::around(corners))
             }
             Dark::Light(row) => {

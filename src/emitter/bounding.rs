@@ -2,13 +2,12 @@
 //!
 //! Energy is the luminance of the peak radiant intensity: `I` of a point, `L A` of a triangle,
 //! `L pi r^2` of a sphere. With a photometric profile it is the mean over directions that counts and not the peak, which
-//! may be anywhere. It is never quite zero: an emitter that a transform has flattened, or that
-//! is dark in this frame, keeps its place in the tree.
+//! may be anywhere. It is never quite zero: an emitter that a transform or the shape of its mesh has
+//! flattened, or that is dark in this frame, keeps its place in the tree.
 
 use super::mesh_light::MeshLight;
 use super::posed::PosedEmitters;
 use super::set::{EmitterPlace, EmitterRef, LightSource};
-use super::triangle::WorldTriangle;
 use crate::bounds::{Aabb, Cone, LightBounds};
 use crate::math::Similarity;
 use crate::math::color::{Rgb, luminance};
@@ -92,10 +91,7 @@ impl PosedEmitters<'_> {
         world: &Affine3A,
         nits: Rgb,
     ) -> LightBounds {
-        let mesh = &self.scene.meshes[mesh_light.mesh as usize];
-        let corners = mesh.triangles[mesh_light.triangle(own) as usize];
-        let corners = corners.map(|c| world.transform_point3(mesh.positions[c as usize]));
-        let triangle = WorldTriangle { corners };
+        let triangle = self.triangle_through(world, mesh_light.mesh, mesh_light.triangle(own));
         let handedness = if mirrors(world) { -1.0 } else { 1.0 };
         let double_sided = self.scene.material_of(mesh_light.mesh).is_some_and(|m| m.double_sided);
         let cone = match mesh_light.shaping {

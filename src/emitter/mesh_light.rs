@@ -113,7 +113,7 @@ impl Key {
     }
 }
 
-/// The triangles that have an area, and light: by the means of their texture, if there is one.
+/// The triangles that have an area, at some time if the mesh deforms, and light: by the means of their texture, if there is one.
 fn emitting_triangles(
     scene: &Scene,
     instance: &Instance,
@@ -123,6 +123,9 @@ fn emitting_triangles(
     let mesh: &Mesh = &scene.meshes[instance.mesh as usize];
     let has_area = |triangle: u32| {
         let corners = mesh.triangles[triangle as usize];
+        if let Some(deformation) = &mesh.deformation {
+            return !deformation.is_always_flat(corners);
+        }
         let [a, b, c] = corners.map(|corner| mesh.positions[corner as usize].as_dvec3());
         (b - a).cross(c - a).length_squared() > 0.0
     };

@@ -3,10 +3,10 @@
 //! [`Emitters`] lists what a scene's lights are made of, in canonical order: triangles of mesh lights,
 //! spheres, points and spots. Finding them is quick, except for the means of emission textures over
 //! triangles ([`TextureMeans`]), which a tree file keeps. [`PosedEmitters`] puts the emitters where a
-//! frame has them. It gives the bounds that a tree is built over, and samples one emitter for a
-//! receiver. For an emitter that a ray has hit it gives the radiance and the sampling density, so that
-//! multiple importance sampling can weigh both ways of finding light. [`InfiniteLight`]s, suns and
-//! domes, stay outside the tree.
+//! frame has them, with the corners that are drawn. It gives the bounds that a tree is built over, and
+//! samples one emitter for a receiver. For an emitter that a ray has hit it gives the radiance and the
+//! sampling density, so that multiple importance sampling can weigh both ways of finding light.
+//! [`InfiniteLight`]s, suns and domes, stay outside the tree.
 //!
 //! This room does not know the tree. Which emitter to sample is decided elsewhere.
 //!

@@ -8,7 +8,7 @@ use crate::math::built_in;
 use crate::math::color::Rgb;
 use crate::math::directions::{aim, light_axes, mirrors};
 use crate::scene::{Instance, Light, LightKind, Material, Pose, Scene, Shaping};
-use glam::{DVec3, Vec2, Vec3};
+use glam::{Affine3A, DVec3, Vec2, Vec3};
 
 /// The emitters of a scene, placed by a pose.
 #[derive(Clone, Copy)]
@@ -235,11 +235,20 @@ impl<'a> PosedEmitters<'a> {
 
     /// A triangle in world space.
     pub(super) fn triangle(&self, instance: &Instance, triangle: u32) -> WorldTriangle {
-        let mesh = &self.scene.meshes[instance.mesh as usize];
-        let world = self.pose.world(instance.node);
-        let corners = mesh.triangles[triangle as usize];
+        self.triangle_through(&self.pose.world(instance.node), instance.mesh, triangle)
+    }
+
+    /// A triangle of a mesh, in the shape that the mesh has in this pose, seen through a transform.
+    pub(super) fn triangle_through(
+        &self,
+        transform: &Affine3A,
+        mesh: u32,
+        triangle: u32,
+    ) -> WorldTriangle {
+        let corners = self.scene.meshes[mesh as usize].triangles[triangle as usize];
+        let positions = self.pose.positions(self.scene, mesh);
         WorldTriangle {
-            corners: corners.map(|c| world.transform_point3(mesh.positions[c as usize])),
+            corners: corners.map(|corner| transform.transform_point3(positions[corner as usize])),
         }
     }
 

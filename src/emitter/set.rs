@@ -55,10 +55,13 @@ pub struct LightEntry {
     pub moves: bool,
     /// Whether its strength varies with time.
     pub varies: bool,
+    /// Whether its mesh changes its shape with time.
+    pub deforms: bool,
     /// Whether it is left out of all estimates and sampled at every point.
     pub forced: bool,
     /// Whether a tree in the space of its own mesh serves it, shared with other instances or carried
-    /// along: its node's transform keeps shapes at every time, and does not change while a shutter is open.
+    /// along: its node's transform keeps shapes at every time, and does not change while a shutter is open; and
+    /// its mesh keeps its shape.
     pub in_own_space: bool,
     /// What it is linked by.
     pub links: Links,
@@ -74,7 +77,7 @@ pub struct LightEntry {
 impl LightEntry {
     /// Whether anything of its bounds changes with time.
     pub fn changes(&self) -> bool {
-        self.moves || self.varies
+        self.moves || self.varies || self.deforms
     }
 
     /// What decides the order of lights, before their paths: the forced come last, before them what
@@ -132,6 +135,7 @@ impl Emitters {
                     source: LightSource::Light(i as u32),
                     moves: moving[light.node as usize],
                     varies: light.values.as_ref().is_some_and(Keys::varies),
+                    deforms: false,
                     forced: light.forced,
                     in_own_space: false,
                     links: scene.linking.of_light(i as u32),
@@ -308,16 +312,18 @@ fn mesh_entries(
     let rows = scene.instances.iter().zip(of_instance).enumerate();
     let entry = |(i, (instance, row)): (usize, (&crate::scene::Instance, &Option<u32>))| {
         let mesh_light = (*row)?;
+        let deforms = scene.changes_shape(instance.mesh);
         let count = mesh_lights[mesh_light as usize].count;
         let (moves, varies) =
             (moving[instance.node as usize], instance.values.as_ref().is_some_and(Keys::varies));
         let is_shared = users[mesh_light as usize] > 1 || moves || varies;
-        let is_placed = !(moves && is_blurred) && keeps_shapes(instance.node);
+        let is_placed = !(deforms || (moves && is_blurred)) && keeps_shapes(instance.node);
         Some(LightEntry {
             path: instance.path.clone(),
             source: LightSource::Mesh { instance: i as u32, mesh_light },
             moves,
             varies,
+            deforms,
             forced: instance.forced,
             in_own_space: is_shared && count >= LEAST_TO_SHARE && is_placed,
             links: scene.linking.of_instance(i as u32),

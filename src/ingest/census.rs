@@ -6,7 +6,7 @@ use crate::scene::Scene;
 /// A tree numbers fewer emitters than this: two of 32 bits tell what a number is of.
 const MOST_EMITTERS: u64 = 1 << 30;
 
-/// Instances that are stretched cannot share a tree: each of their triangles is written out. They may be
+/// Instances that are stretched or deform cannot share a tree: each of their triangles is written out. They may be
 /// this many, and twice as many as the file holds triangles.
 const MOST_WRITTEN_OUT: u64 = 1 << 26;
 
@@ -23,7 +23,7 @@ pub(super) fn check(scene: &Scene) -> Result<(), Fault> {
         if scene.peak_rgb_of_instance(i as u32).max_element() > 0.0 {
             let triangles = scene.meshes[instance.mesh as usize].triangles.len() as u64;
             emitters = emitters.saturating_add(triangles);
-            if !rigid[instance.node as usize] {
+            if !rigid[instance.node as usize] || scene.changes_shape(instance.mesh) {
                 written_out = written_out.saturating_add(triangles);
             }
             paths += instance.path.len() as u64;
@@ -50,11 +50,11 @@ pub(super) fn check(scene: &Scene) -> Result<(), Fault> {
     }
     if written_out > MOST_WRITTEN_OUT.saturating_add(2 * stored) {
         let problem = format!(
-            "has {written_out} triangles that emit in instances that are stretched, out of proportion to the \
+            "has {written_out} triangles that emit in instances that are stretched or deform, out of proportion to the \
              {stored} triangles that it holds{}",
             of_largest()
         );
-        let remedy = "scale the instances alike along all axes, so that they can share a tree";
+        let remedy = "scale the instances alike along all axes, and let none deform, so that they can share a tree";
         return Err(Fault::new("scene", problem).remedy(remedy));
     }
     if paths > MOST_PATH_BYTES {
@@ -68,8 +68,12 @@ pub(super) fn check(scene: &Scene) -> Result<(), Fault> {
 mod tests {
     use super::*;
     use crate::math::color::Rgb;
-    use crate::scene::{Instance, Light, LightKind, Material, Mesh, Node, Trs, Visibility};
+    use crate::scene::{
+        Deformation, Instance, Keys, Light, LightKind, Material, Mesh, Node, Shape, Target, Trs,
+        Visibility,
+    };
     use glam::{DQuat, DVec3};
+    use std::sync::Arc;
 
     /// Instances of one mesh of some triangles that emit.
     fn scene(triangles: usize, instances: usize, scale: DVec3, emission: Rgb) -> Scene {
@@ -111,6 +115,25 @@ mod tests {
         assert_eq!(check((1 << 12) + (1 << 7), DVec3::ONE, Rgb::ZERO), Ok(()));
         assert_eq!(check(60, uneven, Rgb::ONE), Ok(()));
         assert!(check(100, uneven, Rgb::ONE).unwrap_err().contains("stretched"));
+        // What deforms is written out too, however it is scaled; what could and never does is not.
+        for (keys, emission, is_refused) in
+            [(2, Rgb::ONE, true), (1, Rgb::ONE, false), (2, Rgb::ZERO, false)]
+        {
+            let mut scene = scene(1 << 20, 100, DVec3::ONE, emission);
+            let (times_s, values) = (vec![0.0, 1.0], vec![Rgb::ZERO, Rgb::X]);
+            let weights = Keys {
+                times_s: times_s[..keys].into(),
+                values: values[..keys].into(),
+                interpolation: Default::default(),
+            };
+            scene.meshes[0].deformation = Some(Arc::new(Deformation {
+                rest: Shape::default(),
+                targets: vec![Target::default()],
+                weights: [weights].into(),
+                skin: None,
+            }));
+            assert_eq!(super::check(&scene).is_err(), is_refused, "{keys} {emission}");
+        }
     }
 
     #[test]

@@ -198,7 +198,7 @@ fn motion(needs: &Requirements, emitters: &Emitters, frames: usize) -> Vec<Featu
         Feature::new("deforming meshes", needs.deforming_meshes)
             .with("shaped and sorted for rays once a frame, or for each time of a shutter"),
         Feature::new("lights that vary", needs.varying_lights),
-        Feature::new("lights that move or vary", changing)
+        Feature::new("lights that move, vary or deform", changing)
             .with("rows of frames, in the tree file, beside a tree for each that is unlike the others")
             .taking(frames * each),
     ]

@@ -178,7 +178,7 @@ impl LightLook {
 }
 
 impl LightRow {
-    /// It moves or its brightness changes: frames have trees of their own for it.
+    /// It moves, deforms or its brightness changes: frames have trees of their own for it.
     pub const CHANGES: u32 = 2;
     /// Its emitters are in a shared tree, which an instance places.
     pub const PLACED: u32 = 1;

@@ -38,9 +38,10 @@ fn kind(scene: &Scene, light: u32) -> u16 {
 fn texture_mean(posed: &PosedEmitters, row: usize) -> Rgb {
     let light = &posed.emitters.mesh_lights()[row];
     let mesh = &posed.scene.meshes[light.mesh as usize];
+    let positions = posed.pose.positions(posed.scene, light.mesh);
     let sum = (0..light.count).fold(glam::DVec3::ZERO, |sum, own| {
         let corners = mesh.triangles[light.triangle(own) as usize];
-        let [a, b, c] = corners.map(|corner| mesh.positions[corner as usize].as_dvec3());
+        let [a, b, c] = corners.map(|corner| positions[corner as usize].as_dvec3());
         sum + light.texture_mean(own).as_dvec3() * (b - a).cross(c - a).length()
     });
     // `LightLook` wants a hue, whatever its strength; but numbers must stay in range.

@@ -82,6 +82,27 @@ struct Bend {
 }
 
 impl Deformation {
+    /// Whether the shape changes with time.
+    pub fn varies(&self) -> bool {
+        let moves =
+            |skin: &Skin| skin.skeleton.nodes.iter().any(|(_, node)| !node.channels.is_empty());
+        self.weights.iter().any(Keys::varies) || self.skin.as_ref().is_some_and(moves)
+    }
+
+    /// Whether it is proved that a triangle has no area at any time: two of its corners are never apart.
+    pub fn is_always_flat(&self, [a, b, c]: [u32; 3]) -> bool {
+        self.are_together(a, b) || self.are_together(b, c) || self.are_together(c, a)
+    }
+
+    /// Whether two vertices are one at rest, and moved alike.
+    fn are_together(&self, a: u32, b: u32) -> bool {
+        let (a, b) = (a as usize, b as usize);
+        let are_alike = |places: &[Vec3]| places.get(a) == places.get(b);
+        are_alike(&self.rest.positions)
+            && self.targets.iter().all(|target| are_alike(&target.positions))
+            && self.skin.as_ref().is_none_or(|skin| skin.influences(a) == skin.influences(b))
+    }
+
     /// How far the mesh is bent at a time, seconds on the clock of a timeline, where its joints are known.
     fn bend(&self, time_s: f64, timeline: Timeline, joints: Arc<[DAffine3]>) -> Bend {
         let threes = self.weights.iter().map(|keys| keys.at(time_s, timeline).as_vec3());
@@ -156,10 +177,15 @@ impl Skin {
         all_are_near
     }
 
+    /// The joints that move a vertex, with their weights.
+    fn influences(&self, vertex: usize) -> &[(u32, f64)] {
+        let start = vertex.checked_sub(1).map_or(0, |before| self.ends[before]) as usize;
+        &self.influences[start..self.ends[vertex] as usize]
+    }
+
     /// What moves a vertex: the mean of the matrices of its joints. `None` if nothing does.
     pub fn matrix(&self, vertex: usize, joints: &[DAffine3]) -> Option<DAffine3> {
-        let start = vertex.checked_sub(1).map_or(0, |before| self.ends[before]) as usize;
-        let influences = &self.influences[start..self.ends[vertex] as usize];
+        let influences = self.influences(vertex);
         let mut mean = DAffine3::ZERO;
         for &(joint, weight) in influences {
             mean.matrix3 += joints[joint as usize].matrix3 * weight;

@@ -26,7 +26,7 @@ pub struct Mesh {
     /// Index into [`Scene::materials`](super::Scene::materials).
     pub material: Option<u32>,
     /// How it changes its shape over time, if it does. Positions, normals and tangents above are those of the shot's
-    /// first frame; [`Pose::shape`](super::Pose::shape) knows all others. A mesh that gives light never does.
+    /// first frame; [`Pose::shape`](super::Pose::shape) knows all others.
     pub deformation: Option<Arc<Deformation>>,
 }
 

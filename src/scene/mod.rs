@@ -124,7 +124,7 @@ impl Scene {
             && one.shapes.are_alike(&other.shapes)
     }
 
-    /// Whether any light but those at infinity moves, or varies in strength.
+    /// Whether any light but those at infinity moves, varies in strength or changes its shape.
     pub fn has_lights_that_change(&self) -> bool {
         let moving = self.moving_nodes();
         let changes = |node: u32, values: &Option<Keys<_>>| {
@@ -133,7 +133,7 @@ impl Scene {
         let shines = |row: &usize| self.peak_rgb_of_instance(*row as u32).max_element() > 0.0;
         let mut meshes = (0..self.instances.len()).filter(shines).map(|row| &self.instances[row]);
         let mut lights = self.lights.iter().filter(|light| !light.kind.is_infinite());
-        meshes.any(|mesh| changes(mesh.node, &mesh.values))
+        meshes.any(|mesh| changes(mesh.node, &mesh.values) || self.changes_shape(mesh.mesh))
             || lights.any(|light| changes(light.node, &light.values))
     }
 
@@ -148,7 +148,13 @@ impl Scene {
         pose::rigid(&self.nodes)
     }
 
-    /// Whether an instance changes its shape with time.
+    /// Whether a mesh has a shape that changes with time.
+    pub fn changes_shape(&self, mesh: u32) -> bool {
+        let deformation = self.meshes[mesh as usize].deformation.as_ref();
+        built_in::MOTION && deformation.is_some_and(|deformation| deformation.varies())
+    }
+
+    /// Whether an instance has the shapes of a mesh that deforms, which may all be alike.
     pub fn deforms(&self, instance: u32) -> bool {
         let mesh = self.instances[instance as usize].mesh;
         built_in::MOTION && self.meshes[mesh as usize].deformation.is_some()

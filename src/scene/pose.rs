@@ -136,9 +136,14 @@ impl Pose {
     }
 
     /// The positions of a mesh, which may deform, in its own space, metres.
+    #[inline]
     pub fn positions<'a>(&'a self, scene: &'a Scene, mesh: u32) -> &'a [Vec3] {
-        let shape = self.shape(scene, mesh);
-        shape.map_or(&scene.meshes[mesh as usize].positions, |shape| &shape.positions)
+        let own = &scene.meshes[mesh as usize];
+        // Asked at each point of each triangle that shines: most meshes keep their shape.
+        match own.deformation.is_some().then(|| self.shape(scene, mesh)).flatten() {
+            Some(shape) => &shape.positions,
+            None => &own.positions,
+        }
     }
 
     /// Local to world for a node, from [`Scene::origin`] on.

@@ -78,15 +78,10 @@ impl Scene {
     /// A power of two. Cameras and nodes do not count: a view that is added changes no picture.
     fn times_of_a_frame(&self) -> usize {
         let moving = self.moving_nodes();
-        let shines = |row: usize| self.peak_rgb_of_instance(row as u32).max_element() > 0.0;
-        let moving_lights = self
-            .instances
-            .iter()
-            .enumerate()
-            .filter(|(row, instance)| moving[instance.node as usize] && shines(*row));
-        let deforming = self.instances.iter().enumerate();
-        let deforming = deforming.filter(|(row, _)| self.deforms(*row as u32));
-        let posed_by_triangle = moving_lights.chain(deforming);
+        let shines = |row: u32| self.peak_rgb_of_instance(row).max_element() > 0.0;
+        let posed_by_triangle = (0..).zip(&self.instances).filter(|&(row, instance)| {
+            self.deforms(row) || (moving[instance.node as usize] && shines(row))
+        });
         let triangles =
             posed_by_triangle.map(|(_, row)| self.meshes[row.mesh as usize].triangles.len());
         let posed = self.instances.len() + self.lights.len() + triangles.sum::<usize>();

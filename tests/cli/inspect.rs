@@ -169,7 +169,7 @@ fn a_texture_that_nothing_uses_is_off() {
 fn one_light_that_moves_switches_on_the_rows_of_all_frames() {
     let shot = Shot::moving();
     let report = json_of(&shot, &format!("inspect {SCENE} --json"));
-    let (found, state, bytes) = feature(&report, "lights that move or vary");
+    let (found, state, bytes) = feature(&report, "lights that move, vary or deform");
     assert_eq!((found, state.as_str()), (1, "on"));
     shot.candelabra(&format!("build {SCENE}")).ends(0);
     let tree = json_of(&shot, "inspect shot.ltree --json");

@@ -3,4 +3,5 @@
 mod edits;
 mod laws;
 mod links;
+mod shapes;
 mod street;

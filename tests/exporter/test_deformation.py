@@ -278,10 +278,6 @@ GLOWING = """def Material "Glow" { token outputs:surface.connect = </Glow/S.outp
 @pytest.mark.parametrize(
     ("text", "what", "why"),
     [
-        (GLOWING + cube({1: CORNERS, 5: SQUASHED}, POLYGON + "\n rel material:binding = </Glow>").replace(
-            '"M" {', '"M" (prepend apiSchemas = ["MaterialBindingAPI"]) {'), "animated points", "emits light"),
-        (cube({1: CORNERS, 5: SQUASHED}).replace('"M" {', '"M" (prepend apiSchemas = ["MeshLightAPI"]) {'),
-         "animated points", "emits light"),
         (cube({1: CORNERS, 5: SQUASHED}).replace(
             "int[] faceVertexIndices = [0, 1, 3, 2", "int[] faceVertexIndices.timeSamples = { 1: [0, 1, 3, 2").replace(
             "1, 5, 7, 3]", "1, 5, 7, 3], 3: [0, 1, 3, 2, 4, 6, 7, 5, 0, 4, 5, 1, 2, 3, 7, 6, 0, 2, 6, 4, 1, 5, 7, 2] }"),
@@ -301,24 +297,64 @@ def test_what_has_no_carrier_keeps_the_shape_of_the_first_frame(export, text, wh
     assert set(map(tuple, scene.attribute("/M", "POSITION").tolist())) == set(map(tuple, CORNERS.tolist()))
 
 
-def test_a_skinned_light_keeps_its_pose(export):
+LIGHTS = {
+    "a material that glows": GLOWING + cube({1: CORNERS, 5: SQUASHED}, POLYGON + "\n rel material:binding = </Glow>").replace(
+        '"M" {', '"M" (prepend apiSchemas = ["MaterialBindingAPI"]) {'),
+    "a mesh light": cube({1: CORNERS, 5: SQUASHED}).replace('"M" {', '"M" (prepend apiSchemas = ["MeshLightAPI"]) {'),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("light", LIGHTS)
+def test_what_emits_light_deforms_like_any_other_mesh(export, gltf, light):
+    text = SHOT + LIGHTS[light]
+    result = export(text, "--strict")
+    assert result.code == 0, result.err
+    scene = Gltf(result.path)
+    material = scene.json["materials"][scene.primitives("/M")[0]["material"]]
+    assert any(material["emissiveFactor"])
+    assert set(scene.channels("/M")) == {"weights"}
+    for code in (1, 2, 5):
+        same(scene, gltf(text, "--frames", f"{code}"), code)
+
+
+def test_a_skinned_light_is_posed_at_every_frame(export, gltf):
     light = mesh(SKIN).replace('"SkelBindingAPI"]) { ', '"SkelBindingAPI", "MeshLightAPI"]) { ', 1)
-    result = export(figure(light, NOD), "--frames", "1-5")
-    assert result.warned("animation") == {"skinned mesh that deforms"}
-    assert "the pose of frame 1 is used" in result.said()
-    assert "targets" not in Gltf(result.path).primitives("/Figure/M")[0]
+    text = figure(light, NOD)
+    result = export(text, "--frames", "1-5")
+    assert not result.warned("animation")
+    scene = Gltf(result.path)
+    assert scene.primitives("/Figure/M")[0]["targets"]
+    same(scene, gltf(text, "--frames", "4"), 4, "/Figure/M")
 
 
-def test_one_instance_is_a_light_and_the_other_deforms(export):
+def test_a_normalized_light_has_its_power_whatever_its_shape(export):
+    """Its radiance is that over its area at each frame, which scale, too, changes."""
+    text = LIGHTS["a mesh light"].replace(POLYGON, POLYGON + """
+        bool inputs:normalize = 1\n float inputs:intensity = 12
+        float3 xformOp:scale.timeSamples = { 1: (1, 1, 1), 5: (2, 2, 2) }\n uniform token[] xformOpOrder = ["xformOp:scale"]""")
+    result = export(SHOT + text, "--strict")
+    assert result.code == 0, result.err
+    scene = Gltf(result.path)
+    values = scene.node("/M")["extras"]["usdLux"]["values"]
+    times, nits = (np.array(values[name], float) for name in ("times", "rgb"))
+    assert len(times) == 5
+    for time, own in zip(times, nits.reshape(-1, 3), strict=True):
+        found = scene.deformed_triangles("/M", time)
+        cross = np.cross(found[:, 1] - found[:, 0], found[:, 2] - found[:, 0])
+        assert own * np.linalg.norm(cross, axis=1).sum() / 2 == pytest.approx([12] * 3, rel=1e-4)
+
+
+def test_one_instance_is_a_light_and_both_deform(export):
     text = SHOT + 'def "Kit" { ' + cube({1: CORNERS, 5: SQUASHED}) + """ }
         def Xform "A" (instanceable = true\n references = </Kit>) {}
         def Xform "B" (instanceable = true\n references = </Kit>) {}
         def GeometryLight "L" { rel geometry = </A/M> }"""  # fmt: skip
     result = export(text)
     scene = Gltf(result.path)
-    assert "targets" not in scene.primitives("/A/M")[0]
-    assert len(scene.primitives("/B/M")[0]["targets"]) == 1
-    assert [w["path"] for w in result.report["warnings"] if w["what"] == "animated points"] == ["/A/M"]
+    for path in ("/A/M", "/B/M"):
+        assert len(scene.primitives(path)[0]["targets"]) == 1
+        assert set(scene.channels(path)) == {"weights"}
+    assert not result.warned("animation")
 
 
 def test_too_many_bytes_keep_the_first_frame(export, monkeypatch):

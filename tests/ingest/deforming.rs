@@ -2,8 +2,9 @@
 
 use crate::files::{File, lamp};
 use crate::posing::{all, animate, assert_near, bar, bind, load, places, shaded, target};
+use candelabra::emitter::Emitters;
 use candelabra::pipeline;
-use candelabra::scene::{Category, Scene};
+use candelabra::scene::Scene;
 use glam::{Mat4, Quat, Vec3};
 use serde_json::json;
 use std::f32::consts::FRAC_PI_2;
@@ -133,19 +134,63 @@ fn nodes_deform_a_mesh_each_in_its_own_way() {
     assert_eq!(pipeline::frames_of(&scene), (1..=25).collect::<Vec<_>>());
 }
 
-/// A light keeps its shape, and goes along with what its joints have in common.
-#[test]
-fn what_gives_light_goes_along_in_one_piece() {
+/// A bar that bends, gives light, and is carried along.
+fn glowing_bar() -> File {
     let mut file = bar();
     let goes = [0.0, 0.0, 0.0, 0.0, 0.0, 3.0];
     animate(&mut file, 2, "translation", &[0.0, 1.0], &goes, "LINEAR");
     animate(&mut file, 1, "translation", &[0.0, 1.0], &[1.0, 0.0, 0.0, 5.0, 0.0, 0.0], "LINEAR");
-    let scene = load(&file);
-    assert!(scene.meshes[0].deformation.is_none());
-    let [note] = &scene.notes[..] else { panic!("{:?}", scene.notes) };
-    assert_eq!(note.category, Category::Animation);
-    assert!(note.text.contains("it gives light, and so keeps the shape"), "{note}");
-    let (before, after) = (places(&scene, 0, 0.0), places(&scene, 0, 1.0));
-    let moved: Vec<Vec3> = before.iter().map(|&place| place + Vec3::Z * 3.0).collect();
-    assert_near(&after, &moved);
+    file
+}
+
+/// A lamp with a morph target that grows.
+fn glowing_lamp() -> File {
+    let mut file = lamp();
+    target(&mut file, &[("POSITION", &[0.0, 0.0, 1.0, 2.0, 0.0, 0.0, 0.0, 3.0, 0.0])]);
+    animate(&mut file, 0, "weights", &[0.0, 1.0], &[0.0, 1.0], "LINEAR");
+    file
+}
+
+/// What gives light by its material, or by what is said of its node.
+#[test]
+fn what_gives_light_deforms_as_what_gives_none() {
+    for make in [glowing_bar, glowing_lamp] {
+        let of_node = |mut file: File| {
+            let values = json!({"times": [0.0, 1.0], "rgb": [[1.0, 1.0, 1.0], [2.0, 2.0, 2.0]]});
+            file.lux(json!({"type": "MeshLight", "inputs": {}, "values": values}));
+            dark(file)
+        };
+        let [lit, unlit, by_node] = [make(), dark(make()), of_node(make())].map(|file| load(&file));
+        assert_eq!((&lit.notes, &by_node.notes), (&unlit.notes, &unlit.notes));
+        assert_eq!(lit.notes, []);
+        assert_first_is_mesh(&lit);
+        let peak = |scene: &Scene| scene.peak_rgb_of_instance(0).max_element();
+        assert!(peak(&lit) > 0.0 && peak(&by_node) > 0.0 && peak(&unlit) == 0.0);
+        for scene in [&lit, &by_node] {
+            assert!(scene.changes_shape(0) && scene.has_lights_that_change());
+            for second in [0.0, 0.3, 1.0, 7.0] {
+                assert_eq!(places(scene, 0, second), places(&unlit, 0, second));
+            }
+        }
+        assert_ne!(places(&lit, 0, 0.0), places(&lit, 0, 1.0));
+        assert!(!unlit.has_lights_that_change());
+    }
+}
+
+/// A triangle that has no area at first may have one later; one whose corners are never apart has none.
+#[test]
+fn what_may_have_an_area_is_an_emitter() {
+    let collected = |file: &File| Emitters::collect(&load(file)).len();
+    let flat = |moves: [f32; 9], weights: [f32; 2]| {
+        let mut file = lamp();
+        let positions = file.floats(&[0.0; 9], "VEC3");
+        file.attribute("POSITION", positions);
+        target(&mut file, &[("POSITION", &moves)]);
+        animate(&mut file, 0, "weights", &[0.0, 1.0], &weights, "LINEAR");
+        file
+    };
+    let grown = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0];
+    assert_eq!(collected(&flat(grown, [0.0, 1.0])), 1);
+    assert_eq!(collected(&flat([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 0.0, 0.0], [0.0, 1.0])), 0);
+    assert_eq!(collected(&flat(grown, [0.0, 0.0])), 0);
 }

@@ -4,11 +4,13 @@ use candelabra::emitter::Emitters;
 use candelabra::light_tree::{LightTree, TreeKind};
 use candelabra::pipeline::{self, Rebuilt, Survey};
 use candelabra::scene::{
-    Channel, Instance, Keys, Light, LightKind, Material, Mesh, Node, Scene, Shaping, Trs,
+    Channel, Deformation, Instance, Keys, Light, LightKind, Material, Mesh, Node, Scene, Shape,
+    Shaping, Target, Trs,
 };
 use candelabra::store::AlignedBytes;
 use glam::{DQuat, DVec3, Vec3};
 use proptest::prelude::*;
+use std::sync::Arc;
 
 const FRAMES: [i32; 3] = [1, 2, 3];
 
@@ -40,6 +42,8 @@ pub enum Kind {
     Quad,
     /// A mesh of enough triangles to share a tree.
     Fan,
+    /// A mesh of as many that deforms.
+    Flame,
 }
 
 /// What somebody does to a scene. Prims are named by their place among those that there are.
@@ -62,6 +66,7 @@ enum Edit {
 pub fn prim() -> impl Strategy<Value = Prim> {
     let kind = prop_oneof![
         4 => Just(Kind::Point), 1 => Just(Kind::Spot), 1 => Just(Kind::Quad), 1 => Just(Kind::Fan),
+        1 => Just(Kind::Flame),
     ];
     let rarely = || prop::bool::weighted(0.1);
     (any::<u16>(), kind, prop::array::uniform3(-4i8..4), 1u8..4, rarely(), rarely(), rarely())
@@ -126,6 +131,19 @@ fn fan(corners: u32) -> Mesh {
     }
 }
 
+/// What grows along its axis, until 0.1 s.
+fn flame() -> Mesh {
+    let mut mesh = fan(9);
+    let by = mesh.positions.iter().map(|place| Vec3::Z * (1.0 + place.z)).collect();
+    let rest = Shape { positions: mesh.positions.clone(), ..Shape::default() };
+    let targets = vec![Target { positions: by, ..Target::default() }];
+    let values = vec![Vec3::ZERO, Vec3::X];
+    let weights = [Keys { times_s: vec![0.0, 0.1], values, interpolation: Default::default() }];
+    let deformation = Deformation { rest, targets, weights: weights.into(), skin: None };
+    mesh.deformation = Some(Arc::new(deformation));
+    mesh
+}
+
 fn keys(strength: f32) -> Keys<Vec3> {
     let values = vec![Vec3::splat(strength), Vec3::splat(2.0 * strength)];
     Keys { times_s: vec![0.0, 0.1], values, interpolation: Default::default() }
@@ -133,7 +151,7 @@ fn keys(strength: f32) -> Keys<Vec3> {
 
 pub fn scene_of(prims: &[Prim]) -> Scene {
     let glow = Material { emission_nits: Vec3::ONE, ..Material::default() };
-    let meshes = vec![fan(2), fan(9)];
+    let meshes = vec![fan(2), fan(9), flame()];
     let mut scene = Scene { meshes, materials: vec![glow], ..Scene::default() };
     for prim in prims {
         let path = format!("/lights/{:05}", prim.name);
@@ -174,6 +192,7 @@ pub fn scene_of(prims: &[Prim]) -> Scene {
             }
             Kind::Quad => 0,
             Kind::Fan => 1,
+            Kind::Flame => 2,
         };
         scene.instances.push(Instance {
             path,

@@ -47,7 +47,7 @@ fn squashed() -> Stage {
 }
 
 /// The same scene with all meshes as they are in a frame, for good.
-fn frozen(mut scene: Scene, frame: i32) -> Scene {
+pub fn frozen(mut scene: Scene, frame: i32) -> Scene {
     let pose = scene.pose_at(scene.timeline.seconds_at(frame.into()));
     for number in 0..scene.meshes.len() {
         let shape = pose.shape(&scene, number as u32).cloned();
@@ -62,7 +62,7 @@ fn render(scene: &Scene, settings: &RenderSettings, frame: i32) -> RenderBuffers
     Set::of(scene, &[1, 13, 25, 49]).render(settings, frame)
 }
 
-fn bits(picture: &RenderBuffers) -> Vec<[u32; 3]> {
+pub fn bits(picture: &RenderBuffers) -> Vec<[u32; 3]> {
     picture.beauty().map(|rgb| rgb.to_array().map(f32::to_bits)).collect()
 }
 
@@ -109,9 +109,8 @@ fn a_crowd_has_the_shape_of_its_time() {
     }
 }
 
-/// A bar of two joints, whose outer one turns; and the same bar, bent by hand.
-#[test]
-fn joints_bend_a_mesh_at_every_time() {
+/// A bar of two joints along X, whose outer one turns by a quarter in a second.
+pub fn bar() -> Mesh {
     let quarter = std::f32::consts::FRAC_PI_2;
     let turn = Keys {
         times_s: vec![0.0, 1.0],
@@ -147,14 +146,20 @@ fn joints_bend_a_mesh_at_every_time() {
     let deformation = Some(Arc::new(Deformation { rest, targets, weights, skin }));
     let triangles =
         (0..3).flat_map(|i| [[2 * i, 2 * i + 2, 2 * i + 3], [2 * i, 2 * i + 3, 2 * i + 1]]);
-    let mesh = Mesh {
+    Mesh {
         positions,
         normals: vec![Vec3::Z; 8],
         triangles: triangles.collect(),
         deformation,
         ..Mesh::default()
-    };
-    let mut scene = Scene { meshes: vec![mesh], ..Scene::default() };
+    }
+}
+
+/// Against the same bar, bent by hand.
+#[test]
+fn joints_bend_a_mesh_at_every_time() {
+    let quarter = std::f32::consts::FRAC_PI_2;
+    let mut scene = Scene { meshes: vec![bar()], ..Scene::default() };
     scene.timeline.zero_frame = 0.0;
     for (second, angle) in [(0.0, 0.0), (0.5, 0.5 * quarter), (1.0, quarter), (7.0, quarter)] {
         let pose = scene.pose_at(second);

@@ -9,6 +9,7 @@ mod determinism;
 mod extremes;
 mod far;
 mod fitted;
+mod flames;
 mod fog;
 mod forced;
 mod glass;

@@ -92,7 +92,8 @@ fn amount(difference: &Difference, infinite: bool) -> String {
             let parts: Vec<String> = parts.into_iter().flatten().collect();
             let by = if parts.is_empty() { "" } else { ", up to " };
             let frames = counted(apart.frames as usize, "frame");
-            format!("over time: differs in {frames}{by}{}", parts.join(" and "))
+            let shape = if apart.reshaped > 0 { ", of another shape" } else { "" };
+            format!("over time: differs in {frames}{by}{}{shape}", parts.join(" and "))
         }
         Difference::OverTime { before, after, .. } => match (before, after) {
             (false, true) => "now changes with time",

@@ -36,8 +36,6 @@ pub(super) struct Compiled {
     pub mesh: u32,
     /// Where it hangs; else at its node.
     pub hung: Option<Hung>,
-    /// It would deform, but keeps the shape of the first frame.
-    pub is_held: bool,
 }
 
 /// Vertices of a primitive that its triangles use.
@@ -74,10 +72,10 @@ impl Meshes {
                 _ => format!("{object}, primitive {i}"),
             };
             let mesh = self.compile(source, output, primitive, (poses, pose), &object)?;
-            compiled.push(mesh.map(|(mesh, hung, is_held)| {
+            compiled.push(mesh.map(|(mesh, hung)| {
                 let name = row.name.clone().unwrap_or(object);
                 output.scene.meshes.push(Mesh { name, ..mesh });
-                Compiled { mesh: output.scene.meshes.len() as u32 - 1, hung, is_held }
+                Compiled { mesh: output.scene.meshes.len() as u32 - 1, hung }
             }));
         }
         let all = first..output.scene.meshes.len();
@@ -117,7 +115,7 @@ impl Meshes {
         primitive: &Primitive,
         (poses, pose): (&Poses, &Pose),
         object: &str,
-    ) -> Result<Option<(Mesh, Option<Hung>, bool)>, Fault> {
+    ) -> Result<Option<(Mesh, Option<Hung>)>, Fault> {
         let category = category(source, primitive);
         let Checked::Valid(mode @ (Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan)) =
             primitive.mode
@@ -210,9 +208,8 @@ impl Meshes {
         }
         let arrays =
             Arrays { attributes: &attributes, vertices: &vertices, positions: positions.count };
-        let posed =
-            poses.apply(source, output, (pose, &arrays), (&mut mesh, look.emits()), object)?;
-        let Posed { hung, is_held, mut deformation } = posed;
+        let posed = poses.apply(source, output, (pose, &arrays), &mut mesh, object)?;
+        let Posed { hung, mut deformation } = posed;
         mesh.make_unit();
         // A mesh with tangents of no length has none that mean anything.
         if mesh.tangents.iter().any(|tangent| tangent.truncate() == Vec3::ZERO) {
@@ -249,7 +246,7 @@ impl Meshes {
                 }
             };
         }
-        Ok(Some((mesh, hung, is_held)))
+        Ok(Some((mesh, hung)))
     }
 }
 

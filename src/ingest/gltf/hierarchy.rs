@@ -5,7 +5,7 @@ use super::document::{Real, Transform, UsdFog, UsdLux, label, usd_path};
 use super::geometry::{Compiled, Meshes};
 use super::lights::{self, Placed};
 use super::links::LinkTable;
-use super::posing::{self, Hung, Pose, Poses};
+use super::posing::{Hung, Pose, Poses};
 use super::profiles::Profiles;
 use super::{Output, Source, cameras, fog, instancing};
 use crate::ingest::error::Fault;
@@ -95,7 +95,6 @@ pub(super) fn compile(source: &Source, output: &mut Output) -> Result<(), Fault>
         stack.extend(children.map(|&child| open(child, Some(node), visible)));
     }
     walk.hang(output)?;
-    posing::settle(output);
     walk.links.finish(output)
 }
 
@@ -263,7 +262,7 @@ impl Walk<'_> {
         let mesh_number = mesh.value();
         let row = &self.source.document.meshes[mesh_number];
         for (i, compiled) in compiled.iter().enumerate() {
-            let Some(Compiled { mesh, hung, is_held }) = *compiled else { continue };
+            let Some(Compiled { mesh, hung }) = *compiled else { continue };
             let above = output.scene.nodes[node as usize].path.clone();
             // A lone mesh is the node's prim; several, or one beside a light, are below it.
             let own = usd_path(&row.primitives[i].extras);
@@ -286,9 +285,6 @@ impl Walk<'_> {
             let above = links.membership;
             let membership = self.links.of_primitive(output, primitive, above, placed.object)?;
             self.links.add_instance(output, Links { membership, ..links })?;
-            if is_held {
-                output.notes.add(Category::Animation, &*path, posing::KEEPS_SHAPE);
-            }
             if let Some(hung) = hung {
                 let bytes = size_of::<Hanging>() as u64;
                 output.budget.take(bytes, || placed.object.to_string())?;

@@ -10,8 +10,6 @@
 //!   common, and its vertices are in that node's space; so it is carried as a whole by whatever moves there. Where the
 //!   joints never move against each other, that is the deepest common one. Else the mesh
 //!   [deforms](crate::scene::Deformation), and hangs above its skeleton.
-//! - A mesh that gives light keeps the shape of the first frame, for light trees hold lights that stay as they are; a
-//!   note says so.
 //! - Where joints mirror at the first frame, triangles are turned over, so that their fronts stay fronts.
 //! - What cannot be read is left out, with a note: a skin, or all morph targets of a primitive.
 //!
@@ -42,12 +40,7 @@ use gltf::json::mesh::{Primitive, Semantic};
 use gltf::json::validation::Checked;
 use gltf::json::{Index, Mesh as Row, Node};
 use rig::Rig;
-use skin::How;
-use std::collections::{BTreeMap, HashSet};
-
-/// The text of the note on a mesh light that would change its shape.
-pub(super) const KEEPS_SHAPE: &str =
-    "deforms after the first frame; it gives light, and so keeps the shape of the first frame";
+use std::collections::BTreeMap;
 
 /// What poses the meshes of a file.
 pub(super) struct Poses {
@@ -81,8 +74,6 @@ pub(super) struct Hung {
 pub(super) struct Posed {
     /// Where it hangs, if joints move it.
     pub hung: Option<Hung>,
-    /// It would change its shape later, but gives light.
-    pub is_held: bool,
     /// How it changes its shape later.
     pub deformation: Option<Deformation>,
 }
@@ -141,7 +132,7 @@ impl Poses {
         source: &Source,
         output: &mut Output,
         (pose, arrays): (&Pose, &Arrays),
-        (mesh, emits): (&mut Mesh, bool),
+        mesh: &mut Mesh,
         object: &str,
     ) -> Result<Posed, Fault> {
         let is_bound = pose.skin.is_some() && is_bound(arrays.attributes.primitive);
@@ -153,12 +144,10 @@ impl Poses {
         let shape = Shape::take(mesh);
         let rest = shape.clone();
         shape.put(mesh);
-        // What gives light needs no shape but the first.
-        let animated = pose.animated.filter(|_| !emits);
         let (mut targets, mut weights) = (Vec::new(), Vec::new());
         if !pose.weights.is_empty() {
             let first: Vec<f32> = pose.weights.iter().map(|&bits| f32::from_bits(bits)).collect();
-            match morph::apply(output, arrays, (&first, animated.is_some()), mesh, object)? {
+            match morph::apply(output, arrays, (&first, pose.animated.is_some()), mesh, object)? {
                 Ok(read) => (targets, weights) = (read, first),
                 Err(problem) => {
                     let text = format!("{problem}; drawn without its morph targets");
@@ -168,9 +157,8 @@ impl Poses {
         }
         let mut bound = None;
         if let Some(skin) = pose.skin.filter(|_| is_bound) {
-            let how = How { emits, is_animated: animated.is_some() };
-            let skin = (&self.rig, skin);
-            match skin::apply(source, output, skin, arrays, (mesh, how), object)? {
+            let (skin, is_animated) = ((&self.rig, skin), pose.animated.is_some());
+            match skin::apply(source, output, skin, arrays, (mesh, is_animated), object)? {
                 Ok(joints) => bound = Some(joints),
                 Err(problem) => {
                     let text = format!("{problem}; drawn in its rest pose");
@@ -181,31 +169,13 @@ impl Poses {
         let hung = bound.as_ref().map(|bound| bound.hung);
         let is_morphed = pose.animated.is_some() && !targets.is_empty();
         let deforms = is_morphed || hung.is_some_and(|hung| hung.deforms);
-        let weights = match animated.filter(|_| is_morphed) {
+        let weights = match pose.animated.filter(|_| is_morphed) {
             Some(node) => self.weights[&node].keys.clone(),
             None => weights::constant(&weights),
         };
         let skin = bound.map(|bound| bound.skin);
-        let is_held = deforms && emits;
-        let how = || Deformation { rest, targets, weights, skin };
-        let deformation = (deforms && !emits).then(how);
-        Ok(Posed { hung, is_held, deformation })
-    }
-}
-
-/// Lets only meshes deform that give no light: also those whose instances say that they do.
-pub(super) fn settle(output: &mut Output) {
-    let scene = &mut output.scene;
-    let deforms = |mesh: u32| scene.meshes[mesh as usize].deformation.is_some();
-    let shines = |row: u32| scene.peak_rgb_of_instance(row).max_element() > 0.0;
-    let rows = (0..).zip(&scene.instances).filter(|(_, instance)| deforms(instance.mesh));
-    let lit: HashSet<u32> =
-        rows.filter(|&(row, _)| shines(row)).map(|(_, instance)| instance.mesh).collect();
-    for instance in scene.instances.iter().filter(|instance| lit.contains(&instance.mesh)) {
-        output.notes.add(Category::Animation, &*instance.path, KEEPS_SHAPE);
-    }
-    for mesh in lit {
-        scene.meshes[mesh as usize].deformation = None;
+        let deformation = deforms.then_some(Deformation { rest, targets, weights, skin });
+        Ok(Posed { hung, deformation })
     }
 }
 

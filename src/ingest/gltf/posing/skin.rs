@@ -18,15 +18,6 @@ const JOINT_BYTES: usize = 640;
 /// What a vertex takes beside its influences, while the mesh is moved.
 const VERTEX_BYTES: usize = size_of::<(bool, u32, [Vec3; 2], Vec4)>();
 
-/// What else is known of a mesh that joints move.
-#[derive(Clone, Copy)]
-pub(super) struct How {
-    /// It gives light.
-    pub emits: bool,
-    /// The weights of its morph targets change.
-    pub is_animated: bool,
-}
-
 /// How joints move a mesh.
 pub(super) struct Bound {
     pub hung: Hung,
@@ -35,13 +26,14 @@ pub(super) struct Bound {
     has_free: bool,
 }
 
-/// Moves a mesh by the joints of a skin; else says what is wrong with that, and leaves the mesh as it was.
+/// Moves a mesh by the joints of a skin; else says what is wrong with that, and leaves the mesh as it was. The weights of
+/// its morph targets may be animated.
 pub(super) fn apply(
     source: &Source,
     output: &mut Output,
     (rig, skin): (&Rig, usize),
     arrays: &Arrays,
-    (mesh, how): (&mut Mesh, How),
+    (mesh, is_animated): (&mut Mesh, bool),
     object: &str,
 ) -> Result<Result<Bound, String>, Fault> {
     let Some(row) = source.document.skins.get(skin) else {
@@ -55,8 +47,7 @@ pub(super) fn apply(
     output.budget.take(bytes, || object.to_string())?;
     let bytes = ((VERTEX_BYTES + 2 * of_influences) * mesh.positions.len()) as u64;
     output.budget.take(bytes, || object.to_string())?;
-    let How { emits, is_animated } = how;
-    let bound = bind(source, (rig, skin, row), arrays, (mesh, emits));
+    let bound = bind(source, (rig, skin, row), arrays, mesh);
     let bound = bound.and_then(|bound| bend(mesh, &bound.skin, output).map(|()| bound));
     if !bound.as_ref().is_ok_and(|bound| bound.hung.deforms || is_animated) {
         output.budget.put_back(bytes);
@@ -72,7 +63,7 @@ fn bind(
     source: &Source,
     (rig, number, row): (&Rig, usize, &Row),
     arrays: &Arrays,
-    (mesh, emits): (&Mesh, bool),
+    mesh: &Mesh,
 ) -> Result<Bound, String> {
     let nodes: Vec<usize> = row.joints.iter().map(|joint| joint.value()).collect();
     let inverse_bind = row.inverse_bind_matrices.map(|index| source.accessors.get(index));
@@ -106,7 +97,7 @@ fn bind(
     if moving.iter().any(|&joint| !rig.has(nodes[joint])) {
         return Err("its skin has joints that are not in the scene".into());
     }
-    let hung = hang(rig, &nodes, &moving, emits);
+    let hung = hang(rig, &nodes, &moving);
     let skeleton = rig.skeleton((number, hung.below), &nodes, inverse_bind);
     Ok(Bound { hung, skin: Skin { skeleton, ends, influences }, has_free })
 }
@@ -142,16 +133,13 @@ fn is_matrices(accessor: &Accessor, joints: usize) -> bool {
         && accessor.count >= joints
 }
 
-/// Where a mesh hangs that some joints of a skin move. One that emits goes along with what its joints have in common.
-fn hang(rig: &Rig, nodes: &[usize], moving: &[usize], emits: bool) -> Hung {
+/// Where a mesh hangs that some joints of a skin move.
+fn hang(rig: &Rig, nodes: &[usize], moving: &[usize]) -> Hung {
     let mut moving = moving.iter().map(|&joint| nodes[joint]);
     let first = moving.clone().next();
     let common = moving.clone().fold(first, |common, joint| rig.meet(common, Some(joint)));
     if !moving.any(|joint| rig.moves(joint, common)) {
         return Hung { below: common, deforms: false };
-    }
-    if emits {
-        return Hung { below: common, deforms: true };
     }
     let skeleton: HashSet<usize> = nodes.iter().copied().collect();
     Hung { below: rig.above(common, &skeleton), deforms: true }
