@@ -14,6 +14,7 @@ from .primvars import CornerValues, as_rows, normals_may_vary, read_normals
 from .report import Notebook
 from .skinning import Skinning
 from .stage import Frames, changes
+from .velocities import points_at, points_move
 
 _TOPOLOGY = ("faceVertexCounts", "faceVertexIndices")
 
@@ -54,6 +55,8 @@ class PolygonReader:
         names = gprims.SIZES if is_gprim else ("points", *_TOPOLOGY)
         changed = [name for name in names if changes(prim.GetAttribute(name), self.frames)]
         found.changed = [f"animated {name}" for name in changed]
+        if not is_gprim and points_move(prim, self.frames, self.report.about("animation")):
+            found.changed.append("animated points (velocities)")
         authored, corners = found.points, found.corners
         if not is_gprim and self.skinning.may_deform(prim):
             found.changed.append("skinned mesh that deforms")
@@ -75,7 +78,8 @@ class PolygonReader:
         """Whether something that decides the mesh's shape depends on the time."""
         if prim.GetTypeName() in gprims.TYPES:
             return any(changes(prim.GetAttribute(name), self.frames) for name in gprims.SIZES)
-        return changes(prim.GetAttribute("points"), self.frames) or self.skinning.may_deform(prim)
+        moves = changes(prim.GetAttribute("points"), self.frames) or points_move(prim, self.frames)
+        return moves or self.skinning.may_deform(prim)
 
     def at(self, prim: Usd.Prim, code: float, first: Polygons) -> tuple[np.ndarray, CornerValues | None]:
         """Points (v, 3) of a mesh that deforms, and normals if `first` has any, at another time. Raises Unlike."""
@@ -128,7 +132,7 @@ class PolygonReader:
             if not np.array_equal(shape.counts, first.counts):
                 raise Unlike(f"it has other faces at frame {code:g}")
             return shape.points, normals
-        points = as_rows(prim.GetAttribute("points").Get(code), 3)
+        points = points_at(prim, code)
         if len(points) != len(first.points):
             raise Unlike(f"it has {len(first.points)} points at the first frame, {len(points)} at frame {code:g}")
         try:
@@ -164,7 +168,7 @@ class PolygonReader:
     def _mesh(self, prim: Usd.Prim) -> Polygons | None:
         """What a Mesh is at the first frame, not yet posed; None (reported) if that is no mesh."""
         path, mesh, code = prim.GetPath(), UsdGeom.Mesh(prim), self.frames.first
-        points = as_rows(mesh.GetPointsAttr().Get(code), 3)
+        points = points_at(prim, code)
         counts = as_rows(mesh.GetFaceVertexCountsAttr().Get(code), 1, int)
         corners = as_rows(mesh.GetFaceVertexIndicesAttr().Get(code), 1, int)
         if not (len(points) and len(counts) and len(corners)):
