@@ -78,6 +78,8 @@ class Light:
     is_line: bool = False
     """Whether `treatAsLine` is set."""
     force: bool = False
+    casts_shadows: bool = True
+    """`shadow:enable`: whether anything casts shadows from it."""
     texture: Usd.Attribute | None = None
     texture_format: str = "automatic"
     pole_z: bool = False
@@ -127,6 +129,7 @@ def read_light(prim: Usd.Prim, kind: str, frames: Frames, report: Notebook) -> L
         is_point=kind == "SphereLight" and _flag(prim, "treatAsPoint", frames),
         is_line=kind == "CylinderLight" and _flag(prim, "treatAsLine", frames),
         force=_flag(prim, "candelabra:force", frames),
+        casts_shadows=bool(inputs.still("shadow:enable")),
         material_sync=str(prim.GetAttribute("light:materialSyncMode").Get() or "noMaterialResponse"),
         inputs=_verbatim(inputs),
         visibility=light_visibility.read_visibility(prim, frames.first, report),

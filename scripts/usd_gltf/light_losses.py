@@ -24,9 +24,9 @@ def _multipliers(inputs: LightAttributes) -> None:
 
 
 def _shadows(inputs: LightAttributes) -> None:
+    if not inputs.first("shadow:enable"):
+        return  # there are none; `linking` sees to that
     why = "a non-physical control without a carrier; the light casts plain shadows"
-    if not inputs.still("shadow:enable"):
-        inputs.report.warn(inputs.path, "shadow:enable = false", why)
     if any(inputs.still("shadow:color")):
         inputs.report.warn(inputs.path, "shadow:color", why)
     if inputs.still("shadow:distance") >= 0:

@@ -187,7 +187,7 @@ def test_a_missing_payload_is_named_and_an_error_under_strict(export):
 
 
 LOSSES = {
-    "lights": 'def RectLight "K" { bool inputs:shadow:enable = 0 }',
+    "lights": 'def RectLight "K" { float inputs:shadow:distance = 3 }',
     "materials": 'def Material "M" {}\ndef Cube "C" (prepend apiSchemas = ["MaterialBindingAPI"]) { rel material:binding = </M> }',
     "geometry": 'def BasisCurves "C" {}',
     "cameras": 'def Camera "C" { float4[] clippingPlanes = [(0, 1, 0, 2)] }',

@@ -72,7 +72,7 @@ def test_the_new_name_rules_and_the_other_is_listed_if_it_differs(export):
 def test_old_shadows_filters_and_textures_are_not_lost_in_silence(export):
     result = export(
         """def RectLight "L" {
-            bool shadow:enable = 0
+            float shadow:distance = 2
             color3f shadow:color = (1, 0, 0)
             asset texture:file = @gone.exr@
             asset shaping:ies:file = @lamp.ies@
@@ -80,7 +80,7 @@ def test_old_shadows_filters_and_textures_are_not_lost_in_silence(export):
         }
         def LightFilter "F" {}"""
     )
-    assert {"shadow:enable = false", "shadow:color", "missing texture", "IES profile", "light filters"} <= result.warned("lights")
+    assert {"shadow:distance", "shadow:color", "missing texture", "IES profile", "light filters"} <= result.warned("lights")
 
 
 @pytest.mark.parametrize("prefix", ["primvars:arnold:", "arnold:"])
