@@ -49,6 +49,9 @@ class LightAttributes:
     def __init__(self, prim: Usd.Prim, frames: Frames, report: Notebook) -> None:
         self.prim, self.frames, self.report = prim, frames, report
         self.path = prim.GetPath()
+        self.color_link: Usd.Attribute | None = None
+        """`inputs:color`, if a shader's output is connected to it."""
+        self.color_output: Usd.Attribute | None = None
         self.used: set[str] = set()
         """The names, other than `inputs:`, whose values are used or known to be overruled."""
         self._found = {name: self._find(name) for name in FALLBACKS}
@@ -150,6 +153,9 @@ class LightAttributes:
         sources = UsdShade.Utils.GetValueProducingAttributes(UsdShade.Input(own))
         if sources and not UsdShade.Output.IsOutput(sources[0]):
             return sources[0]
+        if sources and own.GetName() == "inputs:color":
+            self.color_link, self.color_output = own, sources[0]
+            return own
         used = "its own value" if own.HasAuthoredValue() else "the schema's value"
         why = f"shader networks on lights have no carrier; {used} is used, and the light may be too bright"
         self.report.warn(self.path, f"connected {own.GetName()}", why)

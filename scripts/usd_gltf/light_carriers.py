@@ -96,7 +96,7 @@ class LightCarriers:
             area = _each_frame(world, lambda linear: world_area(light.type, size, linear))
         nits = self._normalized(light.rgb, normalize, area)
         texture = None
-        if light.texture is not None:
+        if light.texture is not None or light.texels is not None:
             texture, factor = self.pictures.rect(light)
             nits = nits * factor
             if not np.any(factor):
@@ -227,7 +227,7 @@ class LightCarriers:
 
     def _dome(self, light: Light, extras: dict) -> None:
         rgb = light.rgb
-        if light.texture is not None:
+        if light.texture is not None or light.texels is not None:
             uri, factor = self.pictures.dome(light)
             rgb = _settled(self._writable(light, rgb * factor))
             if uri is not None:

@@ -19,7 +19,9 @@ from pxr import Sdf, Usd, UsdLux
 
 from . import light_groups, light_visibility
 from .light_attributes import LightAttributes, is_finite
+from .light_filters import LightFilters
 from .light_losses import report_losses
+from .light_networks import Computed, LightNetworks
 from .report import Notebook
 from .stage import Frames
 from .vendors import report_others
@@ -82,6 +84,8 @@ class Light:
     """`shadow:enable`: whether anything casts shadows from it."""
     texture: Usd.Attribute | None = None
     texture_format: str = "automatic"
+    texels: np.ndarray | None = None
+    """A picture that a network computes, (h, w, 3), which then takes the place of `texture`."""
     pole_z: bool = False
     material_sync: str = "noMaterialResponse"
     inputs: dict = field(default_factory=dict)
@@ -115,13 +119,15 @@ def light_type(prim: Usd.Prim) -> str | None:
     return str(prim.GetTypeName()) or "Light" if prim.HasAPI(UsdLux.LightAPI) else None
 
 
-def read_light(prim: Usd.Prim, kind: str, frames: Frames, report: Notebook) -> Light:
+def read_light(prim: Usd.Prim, kind: str, frames: Frames, networks: LightNetworks, report: Notebook) -> Light:
     """Read all inputs of a light; bad numbers are reported and made harmless."""
     inputs = LightAttributes(prim, frames, report)
+    computed = networks.color(inputs, kind)
     light = Light(
         path=str(prim.GetPath()),
         type=kind,
-        rgb=_emission(inputs),
+        rgb=_emission(inputs, computed, LightFilters(inputs)),
+        texels=None if computed is None else computed.texels,
         normalize=_track([bool(inputs.at("normalize", code)) for code in _codes(inputs, "normalize")]),
         shaping=_shaping(inputs, kind),
         profile=_profile(inputs),
@@ -141,6 +147,8 @@ def read_light(prim: Usd.Prim, kind: str, frames: Frames, report: Notebook) -> L
     if kind in ("RectLight", "DomeLight", "DomeLight_1"):
         light.texture = inputs.asset("texture:file")
         light.texture_format = str(inputs.first("texture:format"))
+        if computed is not None and not computed.is_tinted:
+            light.texture = None
     if kind == "DomeLight_1":
         pole = prim.GetAttribute("poleAxis").Get() or "scene"
         up = prim.GetStage().GetMetadata("upAxis")
@@ -183,9 +191,11 @@ def _flag(prim: Usd.Prim, name: str, frames: Frames) -> bool:
     return bool(attribute.Get(frames.first)) if attribute else False
 
 
-def _emission(inputs: LightAttributes) -> np.ndarray:
-    """intensity * 2^exposure * color * temperature; one row for each frame if it varies."""
-    rows = np.array([_emission_at(inputs, code) for code in _codes(inputs, *_BRIGHTNESS)])
+def _emission(inputs: LightAttributes, computed: Computed | None, filters: LightFilters) -> np.ndarray:
+    """intensity * 2^exposure * color * temperature, and what filters multiply it by; one row for each frame if it varies."""
+    varies = filters.vary or (computed is not None and computed.rows.ndim == 2)
+    codes = inputs.frames.codes if varies else _codes(inputs, *_BRIGHTNESS)
+    rows = np.array([filters.factor(code) * _emission_at(inputs, computed, code) for code in codes])
     good = np.isfinite(rows) & (rows >= 0) & (rows <= float(np.finfo(np.float32).max))
     if not good.all():
         inputs.report.warn(
@@ -198,12 +208,12 @@ def _emission(inputs: LightAttributes) -> np.ndarray:
     return rows[0] if (rows == rows[0]).all() else rows
 
 
-def _emission_at(inputs: LightAttributes, code: float) -> np.ndarray:
+def _emission_at(inputs: LightAttributes, computed: Computed | None, code: float) -> np.ndarray:
     exposure = inputs.at("exposure", code)
     scale = inputs.at("intensity", code) * (2.0**exposure if abs(exposure) < 1000 else math.nan)
     scale *= inputs.at("diffuse", code)
-    color = np.array(inputs.at("color", code), dtype=float)
-    if inputs.at("enableColorTemperature", code):
+    color = np.array(inputs.at("color", code), dtype=float) if computed is None else computed.at(inputs.frames, code)
+    if inputs.at("enableColorTemperature", code) and (computed is None or computed.is_tinted):
         kelvin = inputs.at("colorTemperature", code)
         if not is_finite(kelvin):
             return np.full(3, math.nan)

@@ -36,14 +36,6 @@ def _shadows(inputs: LightAttributes) -> None:
 
 
 def _relations(inputs: LightAttributes) -> None:
-    prim, path, report = inputs.prim, inputs.path, inputs.report
-
-    def targets(name: str) -> list:
-        relationship = prim.GetRelationship(name)
-        return relationship.GetTargets() if relationship else []
-
-    # Files before USD 21.02 say `filters`.
-    if targets("light:filters") or targets("filters"):
-        report.warn(path, "light filters", "they have no carrier; the light is exported unfiltered")
-    if str(prim.GetTypeName()).startswith("DomeLight") and targets("portals"):
-        report.note(path, "dome portals", "they only guide sampling and have no carrier")
+    portals = inputs.prim.GetRelationship("portals")
+    if str(inputs.prim.GetTypeName()).startswith("DomeLight") and portals and portals.GetTargets():
+        inputs.report.note(inputs.path, "dome portals", "they only guide sampling and have no carrier")

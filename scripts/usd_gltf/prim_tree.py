@@ -19,7 +19,9 @@ from . import gprims
 from .cameras import read_camera
 from .fog import read_fog
 from .instancers import Placements, read_placements
+from .light_filters import MULTIPLIER
 from .light_inputs import Light, light_type, read_light
+from .light_networks import LightNetworks
 from .mesh import MeshReader, MeshSource
 from .progress import Progress
 from .report import Notebook
@@ -66,11 +68,12 @@ class PrimTree:
         frames: Frames,
         purposes: tuple[str, ...],
         meters_per_unit: float,
+        networks: LightNetworks,
         report: Notebook,
         progress: Progress,
     ) -> None:
         self.stage, self.meshes, self.frames, self.progress = stage, meshes, frames, progress
-        self.purposes, self.meters_per_unit, self.report = purposes, meters_per_unit, report
+        self.purposes, self.meters_per_unit, self.networks, self.report = purposes, meters_per_unit, networks, report
         self.lights = report.about("lights")
         self._prototypes: dict[str, Prim | None] = {}
         self._open: set[str] = set()
@@ -182,8 +185,8 @@ class PrimTree:
         elif light_type(prim) is not None:
             compiled.light = self._light(prim, light_type(prim))
             compiled.light_path = str(path)
-        elif prim.IsA(UsdLux.LightFilter):
-            self.lights.warn(path, kind, "light filters have no carrier")
+        elif prim.IsA(UsdLux.LightFilter) or kind == MULTIPLIER:
+            pass  # a light that names it says what becomes of it
         elif compiled.fog is None and (prim.IsA(UsdGeom.Gprim) or kind == "Volume"):
             self.report.warn(path, kind, "this kind of geometry has no carrier; it is left out")
         elif kind and not prim.GetPrimTypeInfo().GetSchemaType():
@@ -195,7 +198,7 @@ class PrimTree:
         source = prim.GetPrimInPrototype() if prim.IsInstanceProxy() else prim
         key = (str(source.GetPath()), kind)
         if key not in self._lights:
-            self._lights[key] = read_light(prim, kind, self.frames, self.lights)
+            self._lights[key] = read_light(prim, kind, self.frames, self.networks, self.lights)
         return self._lights[key]
 
     def _instances(self, prim: Usd.Prim, compiled: Prim) -> None:

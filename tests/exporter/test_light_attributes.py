@@ -78,7 +78,7 @@ def test_old_shadows_filters_and_textures_are_not_lost_in_silence(export):
             asset shaping:ies:file = @lamp.ies@
             rel filters = </F>
         }
-        def LightFilter "F" {}"""
+        def PluginLightFilter "F" {}"""
     )
     assert {"shadow:distance", "shadow:color", "missing texture", "IES profile", "light filters"} <= result.warned("lights")
 
@@ -186,7 +186,7 @@ def test_a_connected_input_reads_its_constant_or_says_so(export):
         }
         def RectLight "L" { float inputs:intensity.connect = </M/G.inputs:level> }
         def RectLight "Q" { color3f inputs:color.connect = </S.outputs:rgb> }
-        def Shader "S" { uniform token info:id = "UsdUVTexture"
+        def Shader "S" { uniform token info:id = "arnold:noise"
             float3 outputs:rgb }"""
     )
     assert Gltf(result.path).nits("/L") == pytest.approx([7] * 3)

@@ -233,14 +233,14 @@ def test_lights_without_a_carrier_are_reported(export):
     result = export(
         """def PortalLight "P" { float inputs:width = 2 }
         def PluginLight "X" {}
-        def LightFilter "F" {}
+        def PluginLightFilter "F" {}
         def RectLight "Filtered" {
             float inputs:diffuse = 0.5
             asset inputs:shaping:ies:file = @lamp.ies@
             rel light:filters = </F>
         }"""
     )
-    assert {"PortalLight", "PluginLight", "LightFilter", "inputs:diffuse", "IES profile", "light filters"} <= result.warned()  # fmt: skip
+    assert {"PortalLight", "PluginLight", "inputs:diffuse", "IES profile", "light filters"} <= result.warned()  # fmt: skip
     assert Gltf(result.path).lux("/P")["inputs"] == {"width": 2}
 
 
