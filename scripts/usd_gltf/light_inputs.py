@@ -18,6 +18,7 @@ import numpy as np
 from pxr import Sdf, Usd, UsdLux
 
 from . import light_groups, light_visibility
+from .arnold_placement import placement_names
 from .light_attributes import LightAttributes, is_finite
 from .light_filters import LightFilters
 from .light_losses import report_losses
@@ -119,8 +120,10 @@ def light_type(prim: Usd.Prim) -> str | None:
     return str(prim.GetTypeName()) or "Light" if prim.HasAPI(UsdLux.LightAPI) else None
 
 
-def read_light(prim: Usd.Prim, kind: str, frames: Frames, networks: LightNetworks, report: Notebook) -> Light:
-    """Read all inputs of a light; bad numbers are reported and made harmless."""
+def read_light(
+    prim: Usd.Prim, kind: str, frames: Frames, networks: LightNetworks, has_fog: bool, report: Notebook
+) -> Light:
+    """Read all inputs of a light; bad numbers are reported and made harmless. `has_fog` says whether the stage has any."""
     inputs = LightAttributes(prim, frames, report)
     computed = networks.color(inputs, kind)
     light = Light(
@@ -138,7 +141,7 @@ def read_light(prim: Usd.Prim, kind: str, frames: Frames, networks: LightNetwork
         casts_shadows=bool(inputs.still("shadow:enable")),
         material_sync=str(prim.GetAttribute("light:materialSyncMode").Get() or "noMaterialResponse"),
         inputs=_verbatim(inputs),
-        visibility=light_visibility.read_visibility(prim, frames.first, report),
+        visibility=light_visibility.read_visibility(prim, kind, frames.first, report),
         group=light_groups.read_group(prim, frames.first, report),
     )
     _measure(light, inputs)
@@ -155,9 +158,22 @@ def read_light(prim: Usd.Prim, kind: str, frames: Frames, networks: LightNetwork
         light.pole_z = pole == "Z" or (pole == "scene" and up == "Z")
     report_losses(inputs)
     read = inputs.names | light_visibility.NAMES | set(light_groups.NAMES)
-    read |= {"filters", "treatAsPoint", "treatAsLine"}
-    report_others(prim, read, frames.first, report)
+    read |= {"filters", "treatAsPoint", "treatAsLine"} | placement_names(prim)
+    report_others(prim, read, frames.first, report, _in_arnolds_words(light, inputs), _idle(kind, has_fog))
     return light
+
+
+def _in_arnolds_words(light: Light, inputs: LightAttributes) -> dict[str, object]:
+    """What Arnold's parameters are, computed of the light's inputs as arnold-usd does it (read_light.cpp)."""
+    if light.type != "RectLight":
+        return {}
+    x, y = (inputs.size(name, inputs.frames.first) / 2 for name in ("width", "height"))
+    return {"vertices": [(x, -y, 0.0), (-x, -y, 0.0), (-x, y, 0.0), (x, y, 0.0)]}
+
+
+def _idle(kind: str, has_fog: bool) -> set[str]:
+    """Arnold's parameters that a light of this kind has no use for, or none in this stage."""
+    return ({"angle"} if kind != "DistantLight" else set()) | (set() if has_fog else {"volume", "cast_volumetric_shadows"})
 
 
 def _measure(light: Light, inputs: LightAttributes) -> None:
@@ -218,8 +234,8 @@ def _emission_at(inputs: LightAttributes, computed: Computed | None, code: float
         if not is_finite(kelvin):
             return np.full(3, math.nan)
         if not 1000 <= kelvin <= 10000:
-            why = f"{kelvin:g} K is outside UsdLux's 1000 to 10000 K; the nearer end is used"
-            inputs.report.warn(inputs.path, "color temperature out of range", why)
+            why = f"{kelvin:g} K is outside UsdLux's 1000 to 10000 K; it has the colour of the nearer end, as in USD itself"
+            inputs.report.note(inputs.path, "color temperature out of range", why)
         color = color * np.array(UsdLux.BlackbodyTemperatureAsRgb(kelvin), dtype=float)
     with np.errstate(invalid="ignore", over="ignore"):
         return scale * color

@@ -151,7 +151,7 @@ class PolygonReader:
         """The normals authored at a time."""
         if prim.GetTypeName() in gprims.TYPES:
             return self._gprim(prim, code).normals
-        return read_normals(prim, code, found.counts, found.corners, self.report, over_time=found.deforms)
+        return read_normals(prim, code, found.counts, found.corners, self.report, None if found.deforms else self.frames)
 
     def _pose(self, prim: Usd.Prim, points: np.ndarray, corners: np.ndarray, normals: CornerValues | None):
         """Points and normals in the pose of the first frame; no joint bends an intrinsic gprim."""

@@ -10,14 +10,16 @@ from __future__ import annotations
 import bisect
 import functools
 import math
+import re
 from dataclasses import dataclass, field
 
 import numpy as np
 from pxr import Gf, Usd, UsdGeom, UsdLux, UsdShade
 
 from . import gprims
+from .arnold_placement import placement
 from .cameras import read_camera
-from .fog import read_fog
+from .fog import is_fog, read_fog
 from .instancers import Placements, read_placements
 from .light_filters import MULTIPLIER
 from .light_inputs import Light, light_type, read_light
@@ -30,6 +32,9 @@ from .transforms import between, column
 
 _POLE_Z = np.array([[1, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]], dtype=float)
 """DomeLight_1 with its pole along Z: local +Y goes to +Z, +Z to -Y (usdLux/schema.usda)."""
+_SETTINGS = re.compile(r"Arnold(NodeGraph|Options|\w+Filter|Driver\w+|ColorManager\w+|Imager\w+)(?<!LightFilter)")
+"""arnold-usd's types that are nothing in the scene: graphs of shaders, of which those that read them say what is lost, and
+how Arnold renders and writes pictures."""
 
 
 @dataclass
@@ -80,8 +85,10 @@ class PrimTree:
         self._lights: dict[tuple[str, str], Light] = {}
         self._geometry_lights: dict[str, Usd.Prim] = {}
         self._lit_geometry: set[str] = set()
+        self._has_fog = False
         for prim in Usd.PrimRange(stage.GetPseudoRoot(), PREDICATE):
             progress.total += 1
+            self._has_fog |= is_fog(prim)
             if prim.GetTypeName() == "GeometryLight":
                 light = UsdGeom.Imageable(prim)
                 if light.ComputeVisibility(frames.first) == UsdGeom.Tokens.invisible:
@@ -134,6 +141,10 @@ class PrimTree:
                 below = self._compile(child, purpose, predicate)
                 if below is not None:
                     compiled.children.append(below)
+        if compiled.camera is not None or compiled.light is not None:
+            placed = placement(prim, self.frames.first, self.report.about("cameras") if compiled.camera else self.lights)
+            if placed is not None:
+                _insert(compiled, placed)
         if compiled.light is not None and compiled.light.pole_z:
             _insert(compiled, _POLE_Z)
         if compiled.light is not None and compiled.light.stretch is not None:
@@ -189,7 +200,7 @@ class PrimTree:
             pass  # a light that names it says what becomes of it
         elif compiled.fog is None and (prim.IsA(UsdGeom.Gprim) or kind == "Volume"):
             self.report.warn(path, kind, "this kind of geometry has no carrier; it is left out")
-        elif kind and not prim.GetPrimTypeInfo().GetSchemaType():
+        elif kind and not prim.GetPrimTypeInfo().GetSchemaType() and not _SETTINGS.fullmatch(kind):
             report = self.lights if "Light" in kind else self.report.about("other")
             report.warn(path, f"unknown type {kind}", "no schema is registered for it")
 
@@ -198,7 +209,7 @@ class PrimTree:
         source = prim.GetPrimInPrototype() if prim.IsInstanceProxy() else prim
         key = (str(source.GetPath()), kind)
         if key not in self._lights:
-            self._lights[key] = read_light(prim, kind, self.frames, self.networks, self.lights)
+            self._lights[key] = read_light(prim, kind, self.frames, self.networks, self._has_fog, self.lights)
         return self._lights[key]
 
     def _instances(self, prim: Usd.Prim, compiled: Prim) -> None:
