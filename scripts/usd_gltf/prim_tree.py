@@ -22,13 +22,14 @@ from .cameras import read_camera
 from .fog import is_fog, read_fog
 from .instancers import Placements, read_placements
 from .light_filters import MULTIPLIER
-from .light_inputs import Light, light_type, read_light
+from .light_inputs import SIZES, Light, light_type, read_light
 from .light_networks import LightNetworks
 from .mesh import MeshReader, MeshSource
 from .progress import Progress
 from .report import Notebook
 from .stage import PREDICATE, PROTOTYPE_PREDICATE, Frames, changes
 from .transforms import between, column
+from .vanishing import dark_while_hidden, is_carried, losses, seen_over_time
 
 _POLE_Z = np.array([[1, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]], dtype=float)
 """DomeLight_1 with its pole along Z: local +Y goes to +Z, +Z to -Y (usdLux/schema.usda)."""
@@ -83,6 +84,7 @@ class PrimTree:
         self._prototypes: dict[str, Prim | None] = {}
         self._open: set[str] = set()
         self._lights: dict[tuple[str, str], Light] = {}
+        self._dark: dict[tuple[str, bytes], Light] = {}
         self._geometry_lights: dict[str, Usd.Prim] = {}
         self._lit_geometry: set[str] = set()
         self._has_fog = False
@@ -107,8 +109,9 @@ class PrimTree:
                 self.lights.warn(light.GetPath(), "GeometryLight emits nothing", why)
         return [prim for prim in found if prim is not None]
 
-    def _compile(self, prim: Usd.Prim, purpose, predicate) -> Prim | None:
-        """The tree below `prim`, or None if there is nothing in it to export."""
+    def _compile(self, prim: Usd.Prim, purpose, predicate, seen: np.ndarray | None = None) -> Prim | None:
+        """The tree below `prim`, or None if there is nothing in it to export. `seen` says at which of the sampled time
+        codes what is above does not hide it, if that changes."""
         if prim.IsA(UsdShade.Material) or prim.IsA(UsdShade.NodeGraph):
             return None
         path = prim.GetPath()
@@ -116,11 +119,14 @@ class PrimTree:
         shown = True
         if prim.IsA(UsdGeom.Imageable):
             imageable = UsdGeom.Imageable(prim)
-            visibility = imageable.GetVisibilityAttr()
-            if changes(visibility, self.frames):
-                report = self.lights if _holds_light(prim) else self.report.about("animation")
-                report.warn(path, "animated visibility", "it has no carrier; the first frame's is used")
-            if visibility.Get(self.frames.first) == UsdGeom.Tokens.invisible:
+            own = seen_over_time(imageable, self.frames) if changes(imageable.GetVisibilityAttr(), self.frames) else None
+            if own is not None:
+                seen = own if seen is None else seen & own
+                lost = losses(prim)
+                if lost:
+                    why = "only lights without a mesh vanish; of all else the first frame's is used"
+                    self.report.about(lost).warn(path, "animated visibility", why)
+            elif imageable.GetVisibilityAttr().Get(self.frames.first) == UsdGeom.Tokens.invisible:
                 self.report.count("invisible prims")
                 return None
             purpose = imageable.ComputePurposeInfo(purpose) if purpose else imageable.ComputePurposeInfo()
@@ -132,13 +138,13 @@ class PrimTree:
                 self.report.warn(path, "transform that is not finite", "the prim and all below it are left out")
                 return None
         if prim.IsA(UsdGeom.PointInstancer):
-            if shown:
+            if shown and self._is_seen(seen):
                 self._instances(prim, compiled)
         else:
-            if shown:
-                self._content(prim, compiled)
+            if shown and (self._is_seen(seen) or is_carried(prim)):
+                self._content(prim, compiled, seen)
             for child in prim.GetFilteredChildren(predicate):
-                below = self._compile(child, purpose, predicate)
+                below = self._compile(child, purpose, predicate, seen)
                 if below is not None:
                     compiled.children.append(below)
         if compiled.camera is not None or compiled.light is not None:
@@ -173,7 +179,11 @@ class PrimTree:
             return matrices[0], resets
         return column(xformable.GetLocalTransformation(self.frames.first)), resets
 
-    def _content(self, prim: Usd.Prim, compiled: Prim) -> None:
+    def _is_seen(self, seen: np.ndarray | None) -> bool:
+        """Whether something is seen at the first frame."""
+        return seen is None or bool(seen[self.frames.rest])
+
+    def _content(self, prim: Usd.Prim, compiled: Prim, seen: np.ndarray | None) -> None:
         """What the prim itself is: a mesh, a light, a camera, fog, or something without a carrier."""
         path = prim.GetPath()
         kind = str(prim.GetTypeName())
@@ -196,6 +206,8 @@ class PrimTree:
         elif light_type(prim) is not None:
             compiled.light = self._light(prim, light_type(prim))
             compiled.light_path = str(path)
+            if seen is not None and is_carried(prim) and not seen.all():
+                compiled.light = self._vanishing(compiled.light, seen)
         elif prim.IsA(UsdLux.LightFilter) or kind == MULTIPLIER:
             pass  # a light that names it says what becomes of it
         elif compiled.fog is None and (prim.IsA(UsdGeom.Gprim) or kind == "Volume"):
@@ -211,6 +223,16 @@ class PrimTree:
         if key not in self._lights:
             self._lights[key] = read_light(prim, kind, self.frames, self.networks, self._has_fog, self.lights)
         return self._lights[key]
+
+    def _vanishing(self, light: Light, seen: np.ndarray) -> Light | None:
+        """The light, dark while it is hidden; None if it is never seen."""
+        if light.visibility.get("shadows") and light.type in SIZES:
+            why = "its light vanishes, but its shape goes on to cast shadows, as visibility.shadows says"
+            self.lights.warn(light.path, "animated visibility of a light that casts shadows", why)
+        key = (light.path, seen.tobytes())
+        if key not in self._dark:
+            self._dark[key] = dark_while_hidden(light, seen)
+        return self._dark[key] if seen.any() else None
 
     def _instances(self, prim: Usd.Prim, compiled: Prim) -> None:
         """The prototypes of a PointInstancer and where they are put."""
@@ -292,8 +314,3 @@ def _insert(compiled: Prim, matrix: np.ndarray) -> None:
     for child in compiled.children:
         if not child.resets:
             child.local = np.linalg.pinv(matrix) @ child.local
-
-
-def _holds_light(prim: Usd.Prim) -> bool:
-    """Whether the prim or anything below it is a light."""
-    return any(light_type(below) is not None for below in Usd.PrimRange(prim, PROTOTYPE_PREDICATE))

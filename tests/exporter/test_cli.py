@@ -224,8 +224,8 @@ def test_strict_never_takes_the_word_after_it(export, tmp_path):
 
 
 @pytest.mark.parametrize("light", [True, False])
-def test_a_light_that_is_hidden_over_time_is_a_matter_of_lights(export, light):
-    inside = "def SphereLight \"L\" {}" if light else "def Cube \"C\" {}"
+def test_a_mesh_light_that_is_hidden_over_time_is_a_matter_of_lights(export, light):
+    inside = 'def Cube "C" (prepend apiSchemas = ["MeshLightAPI"]) {}' if light else 'def Cube "C" {}'
     result = export(f'def Xform "X" {{ token visibility.timeSamples = {{ 1: "inherited", 2: "invisible" }}\n {inside} }}')
     assert result.warned("lights" if light else "animation") == {"animated visibility"}
 
