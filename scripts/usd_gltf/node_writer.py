@@ -18,6 +18,7 @@ from .mesh import MeshSource
 from .prim_tree import Prim
 from .report import Notebook
 from .stage import Frames
+from .vanishing import hide
 from .transforms import SHEAR_TOLERANCE, decompose, split_shear
 
 _DEFAULTS = {"translation": [0.0] * 3, "rotation": [0.0, 0.0, 0.0, 1.0], "scale": [1.0] * 3}
@@ -64,6 +65,7 @@ class NodeWriter:
                 self._still[id(prim)] = _still(prim.local)
             index, outer = self._placed(path, prim.name, *self._still[id(prim)])
         self._fill(index, prim, path, world, chain)
+        outer = self._seen(prim, outer)
         if not prim.resets:
             return outer
         # The child of no one: it stands by its own matrix alone.
@@ -130,8 +132,15 @@ class NodeWriter:
                 place = _place(*(part[position] for part in static[:3]))
                 index, outer = self._placed(name, prototype.name, place, None)
             self._fill(index, prototype, name, world @ matrix if prototype.lit else world, chain)
-            nodes.append(outer)
+            nodes.append(self._seen(prototype, outer))
         return nodes
+
+    def _seen(self, prim: Prim, node: int) -> int:
+        """The index of a prim's outermost node, which hides it where it vanishes."""
+        if prim.seen is None:
+            return node
+        self.report.count("animation channels")
+        return hide(self.document, self.frames, node, prim.name, prim.seen)
 
     def _placed(self, path: str, name: str, place: dict, outside: dict | None) -> tuple[int, int]:
         """The index of a node that stands still, and that of the node to hang under the parent."""

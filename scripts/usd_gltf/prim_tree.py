@@ -11,7 +11,7 @@ import bisect
 import functools
 import math
 import re
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from pxr import Gf, Usd, UsdGeom, UsdLux, UsdShade
@@ -29,13 +29,27 @@ from .progress import Progress
 from .report import Notebook
 from .stage import PREDICATE, PROTOTYPE_PREDICATE, Frames, changes
 from .transforms import between, column
-from .vanishing import dark_while_hidden, is_carried, losses, seen_over_time
+from .vanishing import dark_while_hidden, holds_camera, holds_light, is_darkened, is_drawn, seen_over_time
 
 _POLE_Z = np.array([[1, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]], dtype=float)
 """DomeLight_1 with its pole along Z: local +Y goes to +Z, +Z to -Y (usdLux/schema.usda)."""
 _SETTINGS = re.compile(r"Arnold(NodeGraph|Options|\w+Filter|Driver\w+|ColorManager\w+|Imager\w+)(?<!LightFilter)")
 """arnold-usd's types that are nothing in the scene: graphs of shaders, of which those that read them say what is lost, and
 how Arnold renders and writes pictures."""
+
+
+@dataclass(frozen=True)
+class Seen:
+    """At which of the sampled time codes a prim is seen, as far as its visibility and that above it change."""
+
+    at: np.ndarray | None = None
+    drawn: np.ndarray | None = None
+    """The same, of the nodes that hide what is drawn below them."""
+    is_left_out: bool = False
+    """Whether what is drawn is hidden at the first frame, which counts."""
+
+
+_ALWAYS = Seen()
 
 
 @dataclass
@@ -55,6 +69,8 @@ class Prim:
     fog: dict | None = None
     instances: list[tuple[Prim, Placements]] = field(default_factory=list)
     children: list[Prim] = field(default_factory=list)
+    seen: np.ndarray | None = None
+    """At which of `Frames.codes` it is seen, with all below it, if that changes and is drawn."""
     lit: bool = False
     """Whether there is a light in the subtree (then world matrices matter)."""
 
@@ -109,23 +125,20 @@ class PrimTree:
                 self.lights.warn(light.GetPath(), "GeometryLight emits nothing", why)
         return [prim for prim in found if prim is not None]
 
-    def _compile(self, prim: Usd.Prim, purpose, predicate, seen: np.ndarray | None = None) -> Prim | None:
-        """The tree below `prim`, or None if there is nothing in it to export. `seen` says at which of the sampled time
-        codes what is above does not hide it, if that changes."""
+    def _compile(self, prim: Usd.Prim, purpose, predicate, above: Seen = _ALWAYS) -> Prim | None:
+        """The tree below `prim`, or None if there is nothing in it to export. `above` says how what is above hides it."""
         if prim.IsA(UsdShade.Material) or prim.IsA(UsdShade.NodeGraph):
             return None
         path = prim.GetPath()
         self.progress.read(str(path))
-        shown = True
+        shown, seen, own = True, above, None
         if prim.IsA(UsdGeom.Imageable):
             imageable = UsdGeom.Imageable(prim)
-            own = seen_over_time(imageable, self.frames) if changes(imageable.GetVisibilityAttr(), self.frames) else None
-            if own is not None:
-                seen = own if seen is None else seen & own
-                lost = losses(prim)
-                if lost:
-                    why = "only lights without a mesh vanish; of all else the first frame's is used"
-                    self.report.about(lost).warn(path, "animated visibility", why)
+            if changes(imageable.GetVisibilityAttr(), self.frames):
+                seen, own = self._seen(prim, imageable, above)
+                if not seen.at.any():
+                    self.report.count("invisible prims")
+                    return None
             elif imageable.GetVisibilityAttr().Get(self.frames.first) == UsdGeom.Tokens.invisible:
                 self.report.count("invisible prims")
                 return None
@@ -138,10 +151,10 @@ class PrimTree:
                 self.report.warn(path, "transform that is not finite", "the prim and all below it are left out")
                 return None
         if prim.IsA(UsdGeom.PointInstancer):
-            if shown and self._is_seen(seen):
+            if shown and not seen.is_left_out:
                 self._instances(prim, compiled)
         else:
-            if shown and (self._is_seen(seen) or is_carried(prim)):
+            if shown and (not seen.is_left_out or is_darkened(prim)):
                 self._content(prim, compiled, seen)
             for child in prim.GetFilteredChildren(predicate):
                 below = self._compile(child, purpose, predicate, seen)
@@ -161,12 +174,29 @@ class PrimTree:
                 _insert(compiled, movement)
         if compiled.is_empty:
             return None
+        mask = seen.drawn if compiled.resets else own
+        compiled.seen = mask if mask is not None and is_drawn(prim) else None
+        if compiled.light is not None and compiled.light.type in SIZES and compiled.light.visibility.get("shadows"):
+            compiled.seen = seen.at  # its shape is there even while it is dark
         compiled.lit = (
             compiled.light is not None
             or any(child.lit for child in compiled.children)
             or any(prototype.lit for prototype, _ in compiled.instances)
         )
         return compiled
+
+    def _seen(self, prim: Usd.Prim, imageable: UsdGeom.Imageable, above: Seen) -> tuple[Seen, np.ndarray | None]:
+        """How a prim whose visibility changes is seen, and when a node around it is to be; None if there is to be none."""
+        own = seen_over_time(imageable, self.frames)
+        at = own if above.at is None else above.at & own
+        if not is_drawn(prim):
+            return replace(above, at=at), None
+        if holds_camera(prim):
+            report = self.lights if holds_light(prim) else self.report.about("animation")
+            why = "with a camera below it, it has no carrier; the first frame's is used, but by lights without a mesh"
+            report.warn(prim.GetPath(), "animated visibility", why)
+            return replace(above, at=at, is_left_out=above.is_left_out or not own[self.frames.rest]), None
+        return replace(above, at=at, drawn=own if above.drawn is None else above.drawn & own), own
 
     def _local(self, prim: Usd.Prim) -> tuple[np.ndarray, bool]:
         """The local matrix, or one for each frame, and whether it ignores the parents'."""
@@ -179,11 +209,7 @@ class PrimTree:
             return matrices[0], resets
         return column(xformable.GetLocalTransformation(self.frames.first)), resets
 
-    def _is_seen(self, seen: np.ndarray | None) -> bool:
-        """Whether something is seen at the first frame."""
-        return seen is None or bool(seen[self.frames.rest])
-
-    def _content(self, prim: Usd.Prim, compiled: Prim, seen: np.ndarray | None) -> None:
+    def _content(self, prim: Usd.Prim, compiled: Prim, seen: Seen) -> None:
         """What the prim itself is: a mesh, a light, a camera, fog, or something without a carrier."""
         path = prim.GetPath()
         kind = str(prim.GetTypeName())
@@ -206,8 +232,8 @@ class PrimTree:
         elif light_type(prim) is not None:
             compiled.light = self._light(prim, light_type(prim))
             compiled.light_path = str(path)
-            if seen is not None and is_carried(prim) and not seen.all():
-                compiled.light = self._vanishing(compiled.light, seen)
+            if seen.at is not None and is_darkened(prim) and not seen.at.all():
+                compiled.light = self._vanishing(compiled.light, seen.at)
         elif prim.IsA(UsdLux.LightFilter) or kind == MULTIPLIER:
             pass  # a light that names it says what becomes of it
         elif compiled.fog is None and (prim.IsA(UsdGeom.Gprim) or kind == "Volume"):
@@ -226,9 +252,6 @@ class PrimTree:
 
     def _vanishing(self, light: Light, seen: np.ndarray) -> Light | None:
         """The light, dark while it is hidden; None if it is never seen."""
-        if light.visibility.get("shadows") and light.type in SIZES:
-            why = "its light vanishes, but its shape goes on to cast shadows, as visibility.shadows says"
-            self.lights.warn(light.path, "animated visibility of a light that casts shadows", why)
         key = (light.path, seen.tobytes())
         if key not in self._dark:
             self._dark[key] = dark_while_hidden(light, seen)

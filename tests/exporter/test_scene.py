@@ -390,19 +390,6 @@ def test_reset_xform_stack(gltf):
     assert scene.world("/P/C")[:3, 3] == pytest.approx([1, 0, 0])
 
 
-def test_animated_visibility_is_reported(export):
-    result = export(
-        ANIMATED
-        + """def Mesh "M" {
-            token visibility.timeSamples = { 1: "inherited", 2: "invisible" }
-            int[] faceVertexCounts = [3]
-            int[] faceVertexIndices = [0, 1, 2]
-            point3f[] points = [(0,0,0),(1,0,0),(0,1,0)]
-        }"""
-    )
-    assert "animated visibility" in result.warned()
-
-
 def test_a_mirrored_prim_keeps_its_matrix(gltf):
     scene = gltf(
         """def RectLight "L" {
