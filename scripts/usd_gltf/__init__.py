@@ -12,6 +12,9 @@ A tour, in the order of the work:
 `light_attributes`  where a light's input is authored: new names, old ones, Arnold's
 `light_inputs`      UsdLux's formulas: nits, lux, candela
 `light_visibility`, `light_losses`, `vendors`   which rays see a light; what is lost of it
+`light_networks`, `light_filters`   colours that shader networks compute; filters that multiply
+`arnold_placement`  where Arnold's own parameters put lights and cameras
+`vanishing`         visibility over time
 `light_shapes`      tessellation and world-space areas of the intrinsic lights
 `light_carriers`    which glTF object carries which light
 `light_growth`      the radiance of normalized lights while they grow
@@ -22,6 +25,7 @@ A tour, in the order of the work:
 `mesh`, `polygons`, `normals`, `triangulate`, `primvars`, `gprims`     geometry
 `skinning`          poses of skeletons and blend shapes
 `deformation`       morph targets of what changes its shape
+`velocities`        points and instances that move by their velocities
 `subdivision`, `subdivision_topology`, `subdivision_masks`, `subdivision_normals`, `subdivision_seams`   smooth surfaces
 `materials`, `surfaces`, `look_builder`, `textures`     looks: which surface is read, and how glTF says it
 `preview_surface`   UsdPreviewSurface

@@ -10,8 +10,10 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 from pxr import Gf, Sdf, Usd, UsdShade
 
+from .color_spaces import is_known, to_rec709
 from .report import Notebook
 from .stage import Frames, changes
 
@@ -52,6 +54,8 @@ class LightAttributes:
         self.color_link: Usd.Attribute | None = None
         """`inputs:color`, if a shader's output is connected to it."""
         self.color_output: Usd.Attribute | None = None
+        self.known: set[str] = set()
+        """Other names that something else reads."""
         self.used: set[str] = set()
         """The names, other than `inputs:`, whose values are used or known to be overruled."""
         self._found = {name: self._find(name) for name in FALLBACKS}
@@ -60,7 +64,7 @@ class LightAttributes:
     def names(self) -> set[str]:
         """All attributes that are read here, or known to be overruled."""
         everywhere = {f"inputs:{name}" for name in FALLBACKS if name not in _OF_THE_SCHEMA}
-        return self.used | everywhere
+        return self.used | self.known | everywhere
 
     def attribute(self, name: str) -> Usd.Attribute | None:
         """The attribute that gives the input `name` its value."""
@@ -88,6 +92,16 @@ class LightAttributes:
             self.report.warn(self.path, f"{attribute.GetName()} of a wrong type", why)
             return fallback
         return fitting
+
+    def color(self, code: float) -> np.ndarray:
+        """`color` at a time code in linear Rec. 709: of the colour space that the attribute says, or what is above it."""
+        value, attribute = np.array(self.at("color", code), dtype=float), self._found["color"]
+        space = str(Usd.ColorSpaceAPI.ComputeColorSpaceName(attribute, None) or "") if attribute else ""
+        if is_known(space):
+            return to_rec709(space, value)
+        if space and space not in ("unknown", "identity"):
+            self.report.warn(self.path, f"color space {space}", f"{attribute.GetName()} is taken for linear Rec. 709")
+        return value
 
     def first(self, name: str):
         """Value at the first frame."""

@@ -228,7 +228,7 @@ def _emission_at(inputs: LightAttributes, computed: Computed | None, code: float
     exposure = inputs.at("exposure", code)
     scale = inputs.at("intensity", code) * (2.0**exposure if abs(exposure) < 1000 else math.nan)
     scale *= inputs.at("diffuse", code)
-    color = np.array(inputs.at("color", code), dtype=float) if computed is None else computed.at(inputs.frames, code)
+    color = inputs.color(code) if computed is None else computed.at(inputs.frames, code)
     if inputs.at("enableColorTemperature", code) and (computed is None or computed.is_tinted):
         kelvin = inputs.at("colorTemperature", code)
         if not is_finite(kelvin):

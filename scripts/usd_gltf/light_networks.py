@@ -74,7 +74,7 @@ class LightNetworks:
         """The attribute that says what the colour is, and the output of a shader that it reads."""
         for name in SHADERS:
             graph = graph_of(inputs.prim, name)
-            inputs.used |= {name} if graph else set()
+            inputs.known |= {name} if graph else set()
             output = connected(graph, "outputs:color") if graph else None
             if output is not None:
                 return name, output

@@ -21,6 +21,7 @@ from .arnold_placement import placement
 from .cameras import read_camera
 from .fog import is_fog, read_fog
 from .instancers import Placements, read_placements
+from .light_attributes import arnold_names
 from .light_filters import MULTIPLIER
 from .light_inputs import SIZES, Light, light_type, read_light
 from .light_networks import LightNetworks
@@ -220,6 +221,10 @@ class PrimTree:
             light_prim = geometry_light or prim
             is_light = light_type(light_prim) is not None
             compiled.mesh = self.meshes.read(prim, is_light)
+            for name in filter(prim.HasAttribute, () if is_light else arnold_names("light")):
+                if prim.GetAttribute(name).Get(self.frames.first):
+                    why = "Arnold's mesh lights are not read; all that it emits is the glow of its material"
+                    self.lights.warn(path, name, why)
             if compiled.mesh is not None and is_light:
                 compiled.light = self._light(light_prim, "MeshLight")
                 compiled.light_path = str(light_prim.GetPath())

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from conftest import HEADER, Gltf
 from PIL import Image
+from pxr import Gf
 
 FRAMES = HEADER.replace("upAxis", "startTimeCode = 1\n endTimeCode = 5\n upAxis")
 LINEAR = np.arange(1024) / 1024 + 1 / 2048
@@ -250,3 +251,29 @@ def test_a_graph_inside_an_instance(gltf, tmp_path):
     instances = "".join(f'def "{name}" (instanceable = true\n references = @lamp.usda@</root>) {{}}\n' for name in "ab")
     scene = gltf(instances)
     assert scene.nits("/a/L") == pytest.approx([0.25, 2, 0]) and scene.nits("/b/L") == pytest.approx([0.25, 2, 0])
+
+
+# -- colour spaces -----------------------------------------------------------------------------------
+
+SPACES = sorted({str(getattr(Gf.ColorSpaceNames, name)) for name in dir(Gf.ColorSpaceNames) if name[0].isupper()})
+COLOR = (0.6, 0.5, 0.4)
+
+
+@pytest.mark.parametrize("space", SPACES)
+@pytest.mark.parametrize("above", [False, True])
+def test_a_colour_is_converted_from_its_space_as_usd_does_it(export, space, above):
+    """The space of the attribute, or that of ColorSpaceAPI on a prim above."""
+    said = "" if above else f'(colorSpace = "{space}")'
+    api = f'(prepend apiSchemas = ["ColorSpaceAPI"]) {{ uniform token colorSpace:name = "{space}"' if above else "{"
+    text = f'def Xform "X" {api}\n def RectLight "L" {{ float inputs:intensity = 2\n color3f inputs:color = {COLOR} {said}\n }} }}'
+    result = export(text, "--strict")
+    assert result.code == 0, result.err
+    same = space in ("raw", "data", "unknown", "identity")
+    wanted = COLOR if same else Gf.Color(Gf.Color(Gf.Vec3f(*COLOR), Gf.ColorSpace(space)), Gf.ColorSpace("lin_rec709_scene")).GetRGB()
+    assert Gltf(result.path).nits("/X/L") == pytest.approx(2 * np.array(list(wanted)), rel=1e-4)
+
+
+def test_a_colour_space_that_nobody_knows_is_told_of(export):
+    result = export(f'def RectLight "L" {{ color3f inputs:color = {COLOR} (colorSpace = "my_space")\n }}')
+    assert "color space my_space" in result.warned("lights")
+    assert Gltf(result.path).nits("/L") == pytest.approx(COLOR)

@@ -154,3 +154,11 @@ def test_a_placement_that_is_no_view_is_reported(export, kind, lines):
     result = export(f'def {kind} "P" {{ {lines} }}')
     assert result.code == 0 and "there is no view" in result.said()
     assert Gltf(result.path).world("/P") == pytest.approx(np.eye(4))
+
+
+@pytest.mark.parametrize("name", ["primvars:arnold:light", "arnold:light"])
+def test_arnolds_mesh_lights_are_not_lost_in_silence(export, name):
+    assert name in export(f'def Cube "C" {{ bool {name} = 1 }}').warned("lights")
+    assert export(f'def Cube "C" {{ bool {name} = 0 }}', "--strict").code == 0
+    # USD's own API says all.
+    assert name not in export(f'def Cube "C" (prepend apiSchemas = ["MeshLightAPI"]) {{ bool {name} = 1 }}').warned("lights")
