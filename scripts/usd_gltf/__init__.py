@@ -19,7 +19,7 @@ A tour, in the order of the work:
 `light_carriers`    which glTF object carries which light
 `light_growth`      the radiance of normalized lights while they grow
 `linking`           which lights light what, and what casts their shadows
-`light_profiles`    the IES profiles of lights
+`light_shaping`, `light_profiles`   how lights are shaped, over time too; the files of their IES profiles
 `light_textures`    the pictures of rect lights and domes
 `pictures`, `baking`, `asset_files`     picture files into arrays, light of any range into a PNG
 `mesh`, `polygons`, `normals`, `triangulate`, `primvars`, `gprims`     geometry

@@ -63,6 +63,14 @@ def strength_keys(frames: Frames, rgb: np.ndarray, between: dict[float, np.ndarr
     return {"times": numbers(times), "rgb": [numbers(seconds[time]) for time in times]}
 
 
+def without_dark(values: dict) -> dict:
+    """`extras.usdLux.values` without the keys amid others at which the light is dark."""
+    dark = ~np.array(values["rgb"]).any(axis=1)
+    before, after = np.concatenate([[True], dark[:-1]]), np.concatenate([dark[1:], [True]])
+    kept = np.flatnonzero(~(dark & before & after))
+    return {name: [row[key] for key in kept] for name, row in values.items()}
+
+
 def animate(document: Document, node: int, frames: Frames, tracks: dict[str, np.ndarray]) -> int:
     """Add LINEAR channels to `node` for the tracks (one row for each time code of `frames`) that vary.
 

@@ -65,7 +65,7 @@ def export(source: Path, output: Path, options: Options, progress: Progress) -> 
     networks = LightNetworks(surfaces.networks.images, frames, report.about("lights"))
     tree = PrimTree(stage, meshes, frames, options.purposes, meters_per_unit, networks, report.about("geometry"), progress)
     pictures = LightTextures(document, dependencies, frames, report.about("lights"))
-    profiles = LightProfiles(document, dependencies, frames, report.about("lights"))
+    profiles = LightProfiles(document, dependencies, report.about("lights"))
     carriers = LightCarriers(
         document,
         materials,

@@ -19,7 +19,7 @@ import math
 
 import numpy as np
 
-from .animation import strength_keys
+from .animation import strength_keys, without_dark
 from .gltf_document import Document, number, numbers
 from .light_growth import keys_of_growth
 from .light_inputs import SIZES, Light
@@ -74,6 +74,8 @@ class LightCarriers:
         else:
             why = "it has no carrier; its inputs are kept in extras"
             self.report.warn(light.path, light.type, why)
+        if light.lit_at is not None and "values" in extras:
+            extras["values"] = without_dark(extras["values"])
 
     # -- area lights -----------------------------------------------------------------------------
 
@@ -213,13 +215,10 @@ class LightCarriers:
         self._khr_light(node, "spot", self._first(candela), spot)
 
     def _distant(self, light: Light, node: dict, extras: dict) -> None:
-        """Lux on a surface that faces it; the angle of the first frame, the lux of every frame."""
+        """Lux on a surface that faces it."""
         facing = np.vectorize(_facing)(light.angle_deg, light.normalize)
         lux = _settled(_times(light.rgb, facing))
-        extras["angle"] = number(light.angle_deg[self.frames.rest] if light.angle_deg.ndim else light.angle_deg)
-        if light.angle_deg.ndim:
-            why = "the first frame's is kept; every frame has its own illuminance"
-            self.report.warn(light.path, "animated inputs:angle", why)
+        extras["angle"] = number(light.angle_deg)
         self._animated(extras, lux)
         self._khr_light(node, "directional", self._first(lux))
         if extras.pop("shaping", None) is not None:

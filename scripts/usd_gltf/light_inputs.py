@@ -12,7 +12,7 @@ diffuse multiplier is m is carried m times as bright, which is right for everyth
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from pxr import Sdf, Usd, UsdLux
@@ -23,6 +23,7 @@ from .light_attributes import LightAttributes, is_finite
 from .light_filters import LightFilters
 from .light_losses import report_losses
 from .light_networks import Computed, LightNetworks
+from .light_shaping import IesProfile, Shaping, read_shapings
 from .report import Notebook
 from .stage import Frames
 from .vendors import report_others
@@ -49,15 +50,6 @@ _THINNEST = 1e-6
 _BRIGHTNESS = ("intensity", "exposure", "color", "enableColorTemperature", "colorTemperature", "diffuse")
 
 
-@dataclass(frozen=True)
-class IesProfile:
-    """A photometric profile, by the file that it is in."""
-
-    file: Usd.Attribute
-    angle_scale: float
-    normalize: bool
-
-
 @dataclass
 class Light:
     """A light prim, read: everything but where it stands."""
@@ -74,8 +66,8 @@ class Light:
     """(frames, 4, 4): what `size` is scaled by, if it is animated."""
     shaping: dict | None = None
     profile: IesProfile | None = None
-    angle_deg: np.ndarray = field(default_factory=lambda: np.zeros(()))
-    """Full angle of a DistantLight: (), or (frames,)."""
+    angle_deg: float = 0.0
+    """Full angle of a DistantLight."""
     is_point: bool = False
     """Whether `treatAsPoint` is set."""
     is_line: bool = False
@@ -91,6 +83,10 @@ class Light:
     material_sync: str = "noMaterialResponse"
     inputs: dict = field(default_factory=dict)
     visibility: dict = field(default_factory=dict)
+    others: list[Light] = field(default_factory=list)
+    """The lights in its place that it is at other times, if its shaping changes (`light_shaping`)."""
+    lit_at: float | None = None
+    """If there are others, the first time code at which it is the one that shines."""
     group: str | None = None
     """The light group that it is in, if the stage names one."""
 
@@ -132,8 +128,6 @@ def read_light(
         rgb=_emission(inputs, computed, LightFilters(inputs)),
         texels=None if computed is None else computed.texels,
         normalize=_track([bool(inputs.at("normalize", code)) for code in _codes(inputs, "normalize")]),
-        shaping=_shaping(inputs, kind),
-        profile=_profile(inputs),
         # The schema names these without `inputs:`.
         is_point=kind == "SphereLight" and _flag(prim, "treatAsPoint", frames),
         is_line=kind == "CylinderLight" and _flag(prim, "treatAsLine", frames),
@@ -145,8 +139,6 @@ def read_light(
         group=light_groups.read_group(prim, frames.first, report),
     )
     _measure(light, inputs)
-    if kind == "DistantLight":
-        light.angle_deg = _track([min(inputs.size("angle", code), 360.0) for code in _codes(inputs, "angle")])
     if kind in ("RectLight", "DomeLight", "DomeLight_1"):
         light.texture = inputs.asset("texture:file")
         light.texture_format = str(inputs.first("texture:format"))
@@ -156,6 +148,7 @@ def read_light(
         pole = prim.GetAttribute("poleAxis").Get() or "scene"
         up = prim.GetStage().GetMetadata("upAxis")
         light.pole_z = pole == "Z" or (pole == "scene" and up == "Z")
+    _shape(light, read_shapings(inputs, kind), frames)
     report_losses(inputs)
     read = inputs.names | light_visibility.NAMES | set(light_groups.NAMES)
     read |= {"filters", "treatAsPoint", "treatAsLine"} | placement_names(prim)
@@ -169,6 +162,19 @@ def _in_arnolds_words(light: Light, inputs: LightAttributes) -> dict[str, object
         return {}
     x, y = (inputs.size(name, inputs.frames.first) / 2 for name in ("width", "height"))
     return {"vertices": [(x, -y, 0.0), (-x, -y, 0.0), (-x, y, 0.0), (x, y, 0.0)]}
+
+
+def _shape(light: Light, shapings: list[Shaping], frames: Frames) -> None:
+    """Give the light its shaping; if it has several, it becomes as many lights."""
+    rgb, found = light.rgb, []
+    for shaping in shapings:
+        shaped = light if not found else replace(light)
+        shaped.shaping, shaped.profile, shaped.angle_deg = shaping.cone, shaping.profile, shaping.angle_deg
+        if shaping.lit is not None:
+            shaped.rgb = np.where(shaping.lit[:, None], rgb, 0.0)
+            shaped.lit_at = frames.codes[int(np.flatnonzero(shaping.lit)[0])]
+        found.append(shaped)
+    light.others = [other for other in found[1:] if other.rgb.any()]
 
 
 def _idle(kind: str, has_fog: bool) -> set[str]:
@@ -239,39 +245,6 @@ def _emission_at(inputs: LightAttributes, computed: Computed | None, code: float
         color = color * np.array(UsdLux.BlackbodyTemperatureAsRgb(kelvin), dtype=float)
     with np.errstate(invalid="ignore", over="ignore"):
         return scale * color
-
-
-def _shaping(inputs: LightAttributes, kind: str) -> dict | None:
-    """`extras.usdLux.shaping` in degrees, or None if the light is not shaped."""
-    cone, softness = inputs.still("shaping:cone:angle"), inputs.still("shaping:cone:softness")
-    focus, tint = inputs.still("shaping:focus"), [float(c) for c in inputs.still("shaping:focusTint")]
-    if not is_finite(cone, softness, focus, *tint):
-        inputs.report.warn(inputs.path, "shaping is not finite", "the light is exported unshaped")
-        return None
-    cone, focus = min(max(cone, 0.0), 180.0), max(focus, 0.0)
-    softness = min(max(softness, 0.0), 1.0) if inputs.attribute("shaping:cone:angle") else 0.0
-    widest = 90.0 if kind in ("RectLight", "DiskLight") else 180.0
-    if cone >= widest and softness == 0.0 and focus == 0.0:
-        return None
-    return {
-        "coneAngle": cone,
-        "coneSoftness": softness,
-        "focus": focus,
-        "focusTint": [max(c, 0.0) for c in tint],
-    }
-
-
-def _profile(inputs: LightAttributes) -> IesProfile | None:
-    """The photometric profile of the first frame, if there is one."""
-    file = inputs.asset("shaping:ies:file")
-    if file is None:
-        return None
-    inputs.still("shaping:ies:file")
-    scale, normalize = inputs.still("shaping:ies:angleScale"), bool(inputs.still("shaping:ies:normalize"))
-    if not is_finite(scale):
-        inputs.report.warn(inputs.path, "shaping:ies:angleScale is not finite", "0 is used, which scales nothing")
-        scale = 0.0
-    return IesProfile(file, scale, normalize)
 
 
 def _verbatim(inputs: LightAttributes) -> dict:

@@ -74,7 +74,7 @@ class NodeWriter:
 
     def _fill(self, index: int, prim: Prim, path: str, world: np.ndarray, chain: Place) -> None:
         """Content and children of a node."""
-        node = self.document.nodes[index]
+        node, others = self.document.nodes[index], []
         if prim.camera is not None:
             camera, extras = prim.camera
             node["camera"] = self.document.shared("cameras", camera)
@@ -86,6 +86,7 @@ class NodeWriter:
         if prim.light is not None:
             self.carriers.carry(prim.light, node, world, mesh)
             node["extras"]["usdLux"].update(self.linking.light(prim))
+            others = self._others(prim, path, world, chain)
         elif mesh is not None:
             node["mesh"] = self._mesh(mesh)
             if mesh.motion is not None:
@@ -97,12 +98,23 @@ class NodeWriter:
                 node["extras"]["usdLux"] = {"type": "MeshLight", "inputs": {}, "values": values}
             else:
                 prim.mesh.report_still_glow(self.report.about("lights"))
-        children = [self._prim(child, path + child.path[len(prim.path) :], world, chain) for child in prim.children]
+        children = others + [self._prim(child, path + child.path[len(prim.path) :], world, chain) for child in prim.children]
         for prototype, placements in prim.instances:
             children += self._instances(prototype, placements, path, world, (prim.path, *chain))
         children = [child for child in children if child >= 0]
         if children:
             node["children"] = children
+
+    def _others(self, prim: Prim, path: str, world: np.ndarray, chain: Place) -> list[int]:
+        """Nodes of the lights that a light of several shapings is at other times."""
+        nodes = []
+        for light in prim.light.others:
+            extras = {"usdPath": f"{path}[shaping {light.lit_at:.9g}]", **self.linking.node(prim, chain)}
+            node = {"name": prim.name, "extras": extras}
+            nodes.append(self.document.node(node))
+            self.carriers.carry(light, node, world, None)
+            node["extras"]["usdLux"].update(self.linking.light(prim))
+        return nodes
 
     def _mesh(self, mesh: MeshSource) -> int:
         if id(mesh) not in self._meshes:

@@ -50,7 +50,9 @@ def holds_light(prim: Usd.Prim) -> bool:
 
 def dark_while_hidden(light: Light, seen: np.ndarray) -> Light:
     """The light, of no strength at the sampled time codes at which it is not seen."""
-    return replace(light, rgb=np.where(seen[:, None], light.rgb, 0.0))
+    others = [dark_while_hidden(other, seen) for other in light.others]
+    others = [other for other in others if other.rgb.any()]
+    return replace(light, rgb=np.where(seen[:, None], light.rgb, 0.0), others=others)
 
 
 def hide(document: Document, frames: Frames, node: int, name: str, seen: np.ndarray) -> int:

@@ -57,7 +57,9 @@ def report_others(
         if len(words) == 1 and name.startswith("primvars:") and prim.HasAttribute("faceVertexCounts"):
             continue  # a mesh's own primvar
         value = property_.Get(code) if isinstance(property_, Usd.Attribute) else property_.GetTargets()
-        if _is_idle(words, value, said) or (words[0] == "arnold" and words[-1] in unused):
+        times = property_.GetTimeSamples() if isinstance(property_, Usd.Attribute) else ()
+        values = [value, *(property_.Get(time) for time in times)]
+        if all(_is_idle(words, v, said) for v in values) or (words[0] == "arnold" and words[-1] in unused):
             idle.append(name)
         else:
             lines.setdefault(words[0] if len(words) > 1 else "", []).append(f"{name} = {_short(value)}")

@@ -70,6 +70,13 @@ def test_parameters_that_a_light_has_no_use_for(export, kind, line, is_lost):
     assert ("arnold attributes" in export(f'def {kind} "L" {{ {line} }}').warned("lights")) == is_lost
 
 
+def test_what_has_an_effect_later_is_a_loss(export):
+    body = "float barndoorleft.timeSamples = { 1: 0, 3: 40 }\n float primvars:arnold:sss.timeSamples = { 1: 1, 2: 1 }"
+    result = export(FRAMES + f'def RectLight "L" {{ {body} }}')
+    assert result.warned("lights") == {"attributes that USD does not know"}
+    assert "primvars:arnold:sss" in result.report["notes"][0]["why"]
+
+
 @pytest.mark.parametrize("kind", ["ArnoldNodeGraph", "ArnoldOptions", "ArnoldBoxFilter", "ArnoldDriverExr", "ArnoldColorManagerOcio"])
 def test_types_that_are_nothing_in_the_scene_say_nothing(export, kind):
     assert export(f'def {kind} "X" {{}}', "--strict").code == 0
