@@ -159,9 +159,9 @@ def test_a_graph_that_is_named_in_a_referenced_layer(gltf, tmp_path):
     assert scene.nits("/a/L") == pytest.approx([0.25, 2, 0]) and scene.nits("/b/c/L") == pytest.approx([0.25, 2, 0])
 
 
-@pytest.mark.parametrize("line", ['string primvars:arnold:shaders = "/Gone"', 'string primvars:arnold:shaders = "G"', 'string primvars:arnold:shaders = "not a path"'])
-def test_a_graph_that_is_not_there_is_listed(export, line):
-    result = export(f'def RectLight "L" {{ {line} }}\n' + graph(FLAT))
+@pytest.mark.parametrize("path", ["/Gone", "G", "not a path"])
+def test_a_graph_that_is_not_there_is_listed(export, path):
+    result = export(shaded(path=path) + graph(FLAT))
     assert "arnold attributes" in result.warned("lights") and Gltf(result.path).nits("/L") == pytest.approx([1] * 3)
 
 

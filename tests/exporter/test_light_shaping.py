@@ -158,6 +158,7 @@ def test_a_mesh_light_keeps_the_shaping_of_the_first_frame(export):
 
 def test_a_shutter_samples_more_of_them(gltf):
     camera = 'def Camera "V" { double shutter:open = 0\n double shutter:close = 0.5 }\n'
-    scene = gltf(SHOT.replace("endTimeCode = 6", "endTimeCode = 1") + camera + f'def RectLight "L" (prepend apiSchemas = ["ShapingAPI"]) {{ {CONE} }}')
+    light = f'def RectLight "L" (prepend apiSchemas = ["ShapingAPI"]) {{ {CONE} }}'
+    scene = gltf(SHOT.replace("endTimeCode = 6", "endTimeCode = 1") + camera + light)
     for code, angle in ((1, 20), (1.25, 22.5), (1.5, 25)):
         assert scene.lux(shining(scene, "/L", code)[0])["shaping"]["coneAngle"] == pytest.approx(angle)

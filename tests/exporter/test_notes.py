@@ -83,7 +83,8 @@ def test_types_that_are_nothing_in_the_scene_say_nothing(export, kind):
 
 
 @pytest.mark.parametrize(("kind", "category"), [
-    ("ArnoldUsd", "other"), ("ArnoldProcedural", "other"), ("ArnoldUsdLuxLightFilter", "lights"), ("ArnoldSomething", "other"), ("PxrMystery", "other"),
+    ("ArnoldUsd", "other"), ("ArnoldProcedural", "other"), ("ArnoldUsdLuxLightFilter", "lights"),
+    ("ArnoldSomething", "other"), ("PxrMystery", "other"),
 ])  # fmt: skip
 def test_other_types_without_a_schema_are_losses(export, kind, category):
     assert f"unknown type {kind}" in export(f'def {kind} "X" {{}}').warned(category)
@@ -124,7 +125,8 @@ def test_primvars_are_animated_if_they_differ_among_the_frames(export, samples, 
 @pytest.mark.parametrize("prefix", ["primvars:arnold:", "arnold:"])
 def test_what_has_no_transform_stands_where_arnold_puts_it(export, eye, target, up, kind, prefix):
     lines = "\n".join(f"vector3f[] {prefix}{name} = [{value}]" for name, value in (("position", eye), ("look_at", target), ("up", up)))
-    result = export(f'def Xform "X" {{ double3 xformOp:translate = (3, 0, 1)\n uniform token[] xformOpOrder = ["xformOp:translate"]\n def {kind} "P" {{ {lines} }} }}', "--strict")
+    op = 'double3 xformOp:translate = (3, 0, 1)\n uniform token[] xformOpOrder = ["xformOp:translate"]'
+    result = export(f'def Xform "X" {{ {op}\n def {kind} "P" {{ {lines} }} }}', "--strict")
     assert result.code == 0, result.err
     wanted = Gf.Matrix4d().SetLookAt(Gf.Vec3d(*eye), Gf.Vec3d(*target), Gf.Vec3d(*up)).GetInverse()
     moved = np.array(wanted).T + np.array([[0, 0, 0, 3], [0, 0, 0, 0], [0, 0, 0, 1], [0, 0, 0, 0]])
