@@ -19,7 +19,7 @@ import math
 
 import numpy as np
 
-from .animation import strength_keys, without_dark
+from .animation import strength_keys
 from .gltf_document import Document, number, numbers
 from .light_growth import keys_of_growth
 from .light_inputs import SIZES, Light
@@ -74,8 +74,6 @@ class LightCarriers:
         else:
             why = "it has no carrier; its inputs are kept in extras"
             self.report.warn(light.path, light.type, why)
-        if light.lit_at is not None and "values" in extras:
-            extras["values"] = without_dark(extras["values"])
 
     # -- area lights -----------------------------------------------------------------------------
 
@@ -110,7 +108,7 @@ class LightCarriers:
         if light.type == "SphereLight":
             extras["radius"] = number(light.size["radius"])
         grown = keys_of_growth(self.frames, normalize, world, lambda linear: world_area(light.type, size, linear), nits)
-        self._animated(extras, nits, grown)
+        self._animated(light, extras, nits, grown)
         material = self.materials.light_material(Emission(self._first(nits), texture, nits.ndim == 2))
         primitive = {**self._tessellated(light.type, size, texture is not None), "material": material}
         node["mesh"] = self.document.shared("meshes", {"name": light.type, "primitives": [primitive]})
@@ -193,7 +191,7 @@ class LightCarriers:
         if rgb.ndim == 2 and lit:
             grown = keys_of_growth(self.frames, light.normalize, world, mesh.area, rgb)
             glow = np.array(mesh.pieces_lit(light.material_sync)[0].glow)
-            self._animated(extras, rgb * glow, {code: row * glow for code, row in grown.items()})
+            self._animated(light, extras, rgb * glow, {code: row * glow for code, row in grown.items()})
         node["mesh"] = self.document.shared("meshes", {"name": mesh.name, "primitives": lit})
 
     # -- lights without area ---------------------------------------------------------------------
@@ -201,7 +199,7 @@ class LightCarriers:
     def _punctual(self, light: Light, node: dict, extras: dict, candela: np.ndarray) -> None:
         """A point, or a spot if the light is shaped."""
         candela = _settled(candela)
-        self._animated(extras, candela)
+        self._animated(light, extras, candela)
         shaping = extras.get("shaping")
         if shaping is None:
             self._khr_light(node, "point", self._first(candela))
@@ -219,7 +217,7 @@ class LightCarriers:
         facing = np.vectorize(_facing)(light.angle_deg, light.normalize)
         lux = _settled(_times(light.rgb, facing))
         extras["angle"] = number(light.angle_deg)
-        self._animated(extras, lux)
+        self._animated(light, extras, lux)
         self._khr_light(node, "directional", self._first(lux))
         if extras.pop("shaping", None) is not None:
             self.report.warn(light.path, "shaping of a DistantLight", "it has no position to be shaped from")
@@ -232,7 +230,7 @@ class LightCarriers:
             if uri is not None:
                 extras["texture"] = uri
         extras["radiance"] = numbers(self._first(rgb))
-        self._animated(extras, rgb)
+        self._animated(light, extras, rgb)
         if extras.pop("shaping", None) is not None:
             self.report.warn(light.path, "shaping of a DomeLight", "it has no position to be shaped from")
 
@@ -250,10 +248,10 @@ class LightCarriers:
         """The first frame's of (times, 3)."""
         return rgb[self.frames.rest] if rgb.ndim == 2 else rgb
 
-    def _animated(self, extras: dict, rgb: np.ndarray, between: dict[float, np.ndarray] | None = None) -> None:
+    def _animated(self, light: Light, extras: dict, rgb: np.ndarray, between: dict[float, np.ndarray] | None = None) -> None:
         """`extras.usdLux.values`, if the light varies; `between` the time codes that are sampled too."""
         if rgb.ndim == 2:
-            extras["values"] = strength_keys(self.frames, rgb, between)
+            extras["values"] = strength_keys(self.frames, rgb, between, is_mostly_dark=light.lit_at is not None)
 
 
 def _each_frame(world: np.ndarray, area) -> np.ndarray | float:
