@@ -10,7 +10,7 @@ from pxr import Usd, UsdGeom
 from . import gprims
 from .animation import NOISE
 from .normals import Split
-from .primvars import CornerValues, as_rows, normals_may_vary, read_normals
+from .primvars import CornerValues, as_rows, normals_may_vary, normals_vary, read_normals
 from .report import Notebook
 from .skinning import Skinning
 from .stage import Frames, changes
@@ -60,9 +60,13 @@ class PolygonReader:
         authored, corners = found.points, found.corners
         if not is_gprim and self.skinning.may_deform(prim):
             found.changed.append("skinned mesh that deforms")
+        # A subdivision surface has normals of its own, and those of what gives light do not matter.
+        turns = not (is_gprim or emits) and _is_polygonal(prim) and normals_vary(prim, self.frames)
+        if turns and not found.changed:
+            found.changed.append("animated normals")
         if found.changed:
             found.points, _ = self._pose(prim, authored, corners, None)
-            found.deforms = self._is_carried(prim, found, changed, emits)
+            found.deforms = self._is_carried(prim, found, changed, emits, turns)
         normals = self._normals(prim, code, found)
         found.points, found.normals = self._pose(prim, authored, corners, normals)
         if found.deforms and normals is not None:
@@ -99,12 +103,12 @@ class PolygonReader:
             kept = f"{why}; {shape} of frame {self.frames.first:g} is used"
             self.report.about("animation").warn(prim.GetPath(), what, kept)
 
-    def _is_carried(self, prim: Usd.Prim, found: Polygons, changed: list[str], emits: bool) -> bool:
-        """Whether a mesh that may deform does, and can be carried; reported if it cannot."""
+    def _is_carried(self, prim: Usd.Prim, found: Polygons, changed: list[str], emits: bool, turns: bool) -> bool:
+        """Whether a mesh that may deform does, or its normals turn, and that can be carried; reported if it cannot."""
         try:
             if any(name in _TOPOLOGY for name in changed):
                 raise Unlike("topology that changes has no carrier")
-            if not any(self._moves(prim, code, found) for code in self.frames.codes):
+            if not turns and not any(self._moves(prim, code, found) for code in self.frames.codes):
                 return False
             if emits:
                 raise Unlike("it emits light, and what emits keeps one shape")
@@ -183,3 +187,7 @@ class PolygonReader:
             self.report.warn(path, "mesh with a broken topology", f"{why}; it is left out")
             return None
         return Polygons(points, counts, corners)
+
+
+def _is_polygonal(prim: Usd.Prim) -> bool:
+    return UsdGeom.Mesh(prim).GetSubdivisionSchemeAttr().Get() == UsdGeom.Tokens.none

@@ -93,6 +93,16 @@ def normals_may_vary(prim: Usd.Prim) -> bool:
     return bool(attribute) and attribute.ValueMightBeTimeVarying()
 
 
+def normals_vary(prim: Usd.Prim, frames: Frames) -> bool:
+    """Whether what `read_normals` finds differs between two of the frames."""
+    if not normals_may_vary(prim):
+        return False
+    primvar = UsdGeom.PrimvarsAPI(prim).FindPrimvarWithInheritance("normals")
+    if primvar and primvar.HasValue():
+        return changes(primvar.GetAttr(), frames) or changes(primvar.GetIndicesAttr(), frames)
+    return changes(prim.GetAttribute("normals"), frames)
+
+
 def read_normals(
     prim: Usd.Prim, code: float, counts: np.ndarray, corners: np.ndarray, report: Notebook, frames: Frames | None = None
 ) -> CornerValues | None:

@@ -197,3 +197,47 @@ def test_no_time_but_one_is_sampled_without_a_shutter(export):
     result = export(shot().replace(SHUTTER, "") + mesh, "--strict")
     assert result.code == 0, result.err
     assert not Gltf(result.path).json.get("animations")
+
+
+FLAT = np.repeat([[-1, 0, 0], [1, 0, 0], [0, -1, 0], [0, 1, 0], [0, 0, -1], [0, 0, 1]], 4, axis=0).astype(float)
+ROUND = CORNERS / np.sqrt(3)
+INDEX = [0, 1, 3, 2, 4, 6, 7, 5, 0, 4, 5, 1, 2, 3, 7, 6, 0, 2, 6, 4, 1, 5, 7, 3]
+
+
+def normals(kind, name, first, last):
+    return (f'normal3f[] {name} (interpolation = "{kind}")\n'
+            f"normal3f[] {name}.timeSamples = {{ {START}: {rows(first)}, {START + 4}: {rows(last)} }}\n")  # fmt: skip
+
+
+@pytest.mark.parametrize("points", [
+    at("point3f[] points", CORNERS, None),
+    # What moves by less than single precision tells.
+    f"point3f[] points.timeSamples = {{ {START}: {rows(CORNERS)}, {START + 4}: {rows(CORNERS * 1.0000002)} }}\n",
+])  # fmt: skip
+@pytest.mark.parametrize("name", ["normals", "primvars:normals"])
+@pytest.mark.parametrize(("kind", "first", "last"), [("faceVarying", FLAT, ROUND[INDEX]), ("vertex", ROUND, -ROUND)])
+def test_normals_of_polygons_that_rest_turn_as_authored(export, name, kind, first, last, points):
+    mesh = cube(points, normals(kind, name, first, last))
+    result = export(shot(START + 4).replace(SHUTTER, "") + mesh, "--strict")
+    assert result.code == 0, result.err
+    scene = Gltf(result.path)
+    spread = (lambda array: array) if kind == "faceVarying" else (lambda array: array[INDEX])
+    for step in range(5):
+        # Linear between samples, as UsdGeom has it; compared where the corner is and by what it has there.
+        wanted = spread(first) + step / 4 * (spread(last) - spread(first))
+        length = np.linalg.norm(wanted, axis=1, keepdims=True)
+        seconds = step / 24
+        places, found = (scene.deformed("/M", seconds, key) for key in ("POSITION", "NORMAL"))
+        found = found / np.maximum(np.linalg.norm(found, axis=1, keepdims=True), 1e-9)
+        for corner, normal, size in zip(CORNERS[INDEX], wanted, length[:, 0], strict=True):
+            if size > 0.1:
+                here = found[np.abs(places - corner).max(axis=1) < 1e-5]
+                assert np.abs(here - normal / size).max(axis=1).min() < 2e-3
+        assert corners_of(places) == pytest.approx(corners_of(CORNERS))
+
+
+@pytest.mark.parametrize("last", [FLAT, None])
+def test_normals_that_are_the_same_do_not_turn(export, last):
+    text = normals("faceVarying", "primvars:normals", FLAT, FLAT if last is None else last)
+    scene = Gltf(export(shot(START + 4) + cube(at("point3f[] points", CORNERS, None), text), "--strict").path)
+    assert "targets" not in scene.primitives("/M")[0]
