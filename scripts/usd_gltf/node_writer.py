@@ -18,8 +18,8 @@ from .mesh import MeshSource
 from .prim_tree import Prim
 from .report import Notebook
 from .stage import Frames
-from .vanishing import hide
 from .transforms import SHEAR_TOLERANCE, decompose, split_shear
+from .vanishing import hide
 
 _DEFAULTS = {"translation": [0.0] * 3, "rotation": [0.0, 0.0, 0.0, 1.0], "scale": [1.0] * 3}
 

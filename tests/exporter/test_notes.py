@@ -171,3 +171,26 @@ def test_arnolds_mesh_lights_are_not_lost_in_silence(export, name):
     assert export(f'def Cube "C" {{ bool {name} = 0 }}', "--strict").code == 0
     # USD's own API says all.
     assert name not in export(f'def Cube "C" (prepend apiSchemas = ["MeshLightAPI"]) {{ bool {name} = 1 }}').warned("lights")
+
+
+# What is left of their lights, cameras and motion is what the files lack, or `docs/what_is_read.md` names.
+REAL = {
+    "test_0047/data/scene.usda": set(),  # a network's colour on a dome
+    "test_0181/data/test.usda": set(),  # a ramp on a dome, a filter that does nothing
+    "test_0193/data/scene.usda": {"shadow:color", "unknown type ArnoldUsdLuxLightFilter"},  # shadow:enable
+    "test_1427.3/data/test.usd": {"animated camera focalLength", "animated camera horizontalAperture", "animated camera verticalAperture"},
+    "test_1442/data/test.usd": set(),  # instances with velocities
+    "test_1521/data/test.usda": set(),  # a camera where Arnold puts it
+    "test_2477.1/data/test.usda": {"IES profile"},  # shaping over time; one profile's file is not there
+    "test_2477.2/data/test.usda": {"IES profile"},
+    "test_2477.3/data/test.usda": {"IES profile"},
+    "test_2477.4/data/test.usda": {"IES profile"},
+    "test_2645/data/test.usda": set(),  # a network that is named in a referenced layer
+}
+
+
+@pytest.mark.parametrize("stage", REAL)
+def test_real_stages_with_these_features_lose_nothing_of_them(export, shared, stage):
+    result = export(shared / "real" / "arnold_usd_lux" / stage)
+    assert result.code == 0, result.err
+    assert set().union(*(result.warned(category) for category in ("lights", "cameras", "animation"))) == REAL[stage]
