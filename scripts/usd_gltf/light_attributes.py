@@ -8,6 +8,7 @@ and reports every name but the first.
 
 from __future__ import annotations
 
+import functools
 import math
 
 import numpy as np
@@ -95,13 +96,19 @@ class LightAttributes:
 
     def color(self, code: float) -> np.ndarray:
         """`color` at a time code in linear Rec. 709: of the colour space that the attribute says, or what is above it."""
-        value, attribute = np.array(self.at("color", code), dtype=float), self._found["color"]
+        value = np.array(self.at("color", code), dtype=float)
+        return to_rec709(self._color_space, value) if self._color_space else value
+
+    @functools.cached_property
+    def _color_space(self) -> str:
+        """That of `color`; empty for linear Rec. 709, and (reported) for one that is not known."""
+        attribute = self._found["color"]
         space = str(Usd.ColorSpaceAPI.ComputeColorSpaceName(attribute, None) or "") if attribute else ""
         if is_known(space):
-            return to_rec709(space, value)
+            return space
         if space and space not in ("unknown", "identity"):
             self.report.warn(self.path, f"color space {space}", f"{attribute.GetName()} is taken for linear Rec. 709")
-        return value
+        return ""
 
     def first(self, name: str):
         """Value at the first frame."""
