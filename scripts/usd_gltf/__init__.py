@@ -12,16 +12,20 @@ A tour, in the order of the work:
 `light_attributes`  where a light's input is authored: new names, old ones, Arnold's
 `light_inputs`      UsdLux's formulas: nits, lux, candela
 `light_visibility`, `light_losses`, `vendors`   which rays see a light; what is lost of it
+`light_networks`, `light_filters`   colours that shader networks compute; filters that multiply
+`arnold_placement`  where Arnold's own parameters put lights and cameras
+`vanishing`         visibility over time
 `light_shapes`      tessellation and world-space areas of the intrinsic lights
 `light_carriers`    which glTF object carries which light
 `light_growth`      the radiance of normalized lights while they grow
 `linking`           which lights light what, and what casts their shadows
-`light_profiles`    the IES profiles of lights
+`light_shaping`, `light_profiles`   how lights are shaped, over time too; the files of their IES profiles
 `light_textures`    the pictures of rect lights and domes
 `pictures`, `baking`, `asset_files`     picture files into arrays, light of any range into a PNG
 `mesh`, `polygons`, `normals`, `triangulate`, `primvars`, `gprims`     geometry
 `skinning`          poses of skeletons and blend shapes
 `deformation`       morph targets of what changes its shape
+`velocities`        points and instances that move by their velocities
 `subdivision`, `subdivision_topology`, `subdivision_masks`, `subdivision_normals`, `subdivision_seams`   smooth surfaces
 `materials`, `surfaces`, `look_builder`, `textures`     looks: which surface is read, and how glTF says it
 `preview_surface`   UsdPreviewSurface

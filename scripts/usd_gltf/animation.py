@@ -54,9 +54,16 @@ def needed(frames: Frames, values: np.ndarray, turns: bool = False) -> np.ndarra
     return np.flatnonzero(kept)
 
 
-def strength_keys(frames: Frames, rgb: np.ndarray, between: dict[float, np.ndarray] | None = None) -> dict:
-    """`extras.usdLux.values`: strengths (n, 3), one for each time code of `frames`, and those at codes `between`."""
-    rows = {frames.codes[key]: rgb[key] for key in needed(frames, rgb)}
+def strength_keys(
+    frames: Frames, rgb: np.ndarray, between: dict[float, np.ndarray] | None = None, is_mostly_dark: bool = False
+) -> dict:
+    """`extras.usdLux.values`: strengths (n, 3), one for each time code of `frames`, and those at codes `between`. Of a
+    light that `is_mostly_dark` keys at which it is dark amid others are left out."""
+    keys = needed(frames, rgb)
+    if is_mostly_dark:
+        dark = np.concatenate([[True], ~rgb[keys].any(axis=1), [True]])
+        keys = keys[~(dark[:-2] & dark[1:-1] & dark[2:])]
+    rows = {frames.codes[key]: rgb[key] for key in keys}
     # The sampled ones are kept where 32 bits cannot tell times apart.
     seconds = {np.float32(frames.seconds_at(code)): row for code, row in [*(between or {}).items(), *rows.items()]}
     times = sorted(seconds)

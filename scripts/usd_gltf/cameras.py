@@ -10,6 +10,7 @@ import math
 
 from pxr import Usd, UsdGeom
 
+from .arnold_placement import placement_names
 from .gltf_document import number, numbers
 from .report import Notebook
 from .shutters import authored_shutter, is_interval
@@ -109,7 +110,19 @@ def _report_losses(camera: UsdGeom.Camera, frames: Frames, report: Notebook) -> 
         report.warn(path, "clippingPlanes", f"{len(planes)} planes have no carrier; nothing is cut by them")
     if camera.GetStereoRoleAttr().Get(frames.first) not in (None, UsdGeom.Tokens.mono):
         report.note(path, "camera stereoRole", "each camera is carried by itself")
-    report_others(prim, set(), frames.first, report)
+    report_others(prim, placement_names(prim), frames.first, report, _in_arnolds_words(camera, frames.first))
+
+
+def _in_arnolds_words(camera: UsdGeom.Camera, code: float) -> dict[str, float]:
+    """What Arnold's parameters are, computed of the camera's attributes as arnold-usd does it (read_camera.cpp). Its
+    writer repeats some of them, so as to read the very bits again."""
+    found = camera.GetCamera(code)
+    shutter = authored_shutter(camera, code) or (0.0, 0.0)
+    return {
+        "fov": found.GetFieldOfView(found.FOVHorizontal), "focus_distance": found.focusDistance,
+        "near_clip": found.clippingRange.min, "far_clip": found.clippingRange.max,
+        "shutter_start": shutter[0], "shutter_end": shutter[1],
+    }  # fmt: skip
 
 
 def _finite(value: float) -> float:

@@ -11,6 +11,7 @@ from pxr import Usd, UsdGeom
 from . import EXPORTER
 from .gltf_document import Document, number
 from .light_carriers import LightCarriers
+from .light_networks import LightNetworks
 from .light_profiles import LightProfiles
 from .light_textures import LightTextures
 from .linking import Linking, LinkSubsets
@@ -61,9 +62,10 @@ def export(source: Path, output: Path, options: Options, progress: Progress) -> 
     skinning = Skinning(stage, frames, report.about("geometry"))
     meshes = MeshReader(document, materials, skinning, frames, options.complexity, report.about("geometry"))
     meshes.link_subsets = LinkSubsets(stage, report.about("lights"))
-    tree = PrimTree(stage, meshes, frames, options.purposes, meters_per_unit, report.about("geometry"), progress)
+    networks = LightNetworks(surfaces.networks.images, frames, report.about("lights"))
+    tree = PrimTree(stage, meshes, frames, options.purposes, meters_per_unit, networks, report.about("geometry"), progress)
     pictures = LightTextures(document, dependencies, frames, report.about("lights"))
-    profiles = LightProfiles(document, dependencies, frames, report.about("lights"))
+    profiles = LightProfiles(document, dependencies, report.about("lights"))
     carriers = LightCarriers(
         document,
         materials,

@@ -19,6 +19,11 @@ _STEEPEST = 0.9999
 """Nearest to 1 that an anisotropy is written."""
 
 
+def is_fog(prim: Usd.Prim) -> bool:
+    """Whether a prim may be fog."""
+    return prim.GetTypeName() == "Volume" and prim.HasAttribute("candelabra:fog:extinction")
+
+
 def read_fog(prim: Usd.Prim, frames: Frames, report: Notebook) -> dict | None:
     """`extras.usdFog` of a Volume; None if it has no authored extinction, or (reported) no sense."""
     reader = _Reader(prim, frames, report)

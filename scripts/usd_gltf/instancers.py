@@ -11,6 +11,7 @@ from .primvars import as_rows
 from .report import Notebook
 from .stage import Frames
 from .transforms import column
+from .velocities import instances_move
 
 
 @dataclass
@@ -33,7 +34,8 @@ def read_placements(prim: Usd.Prim, frames: Frames, report: Notebook) -> dict[in
         why = "positions, orientations, scales and protoIndices have different lengths"
         report.warn(path, "PointInstancer without usable instances", why)
         return {}
-    states = [_state(instancer, code) for code in frames.codes] if _moves(instancer) else []
+    moves = _moves(instancer) or instances_move(instancer, frames, report.about("animation"))
+    states = [_state(instancer, code) for code in frames.codes] if moves else []
     if len(states) > 1:
         if all(len(m) == len(matrices) and np.array_equal(p, prototypes) and np.array_equal(s, shown)
                for m, p, s in states):  # fmt: skip

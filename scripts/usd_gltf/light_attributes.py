@@ -8,10 +8,13 @@ and reports every name but the first.
 
 from __future__ import annotations
 
+import functools
 import math
 
+import numpy as np
 from pxr import Gf, Sdf, Usd, UsdShade
 
+from .color_spaces import is_known, to_rec709
 from .report import Notebook
 from .stage import Frames, changes
 
@@ -49,6 +52,11 @@ class LightAttributes:
     def __init__(self, prim: Usd.Prim, frames: Frames, report: Notebook) -> None:
         self.prim, self.frames, self.report = prim, frames, report
         self.path = prim.GetPath()
+        self.color_link: Usd.Attribute | None = None
+        """`inputs:color`, if a shader's output is connected to it."""
+        self.color_output: Usd.Attribute | None = None
+        self.known: set[str] = set()
+        """Other names that something else reads."""
         self.used: set[str] = set()
         """The names, other than `inputs:`, whose values are used or known to be overruled."""
         self._found = {name: self._find(name) for name in FALLBACKS}
@@ -57,7 +65,7 @@ class LightAttributes:
     def names(self) -> set[str]:
         """All attributes that are read here, or known to be overruled."""
         everywhere = {f"inputs:{name}" for name in FALLBACKS if name not in _OF_THE_SCHEMA}
-        return self.used | everywhere
+        return self.used | self.known | everywhere
 
     def attribute(self, name: str) -> Usd.Attribute | None:
         """The attribute that gives the input `name` its value."""
@@ -85,6 +93,22 @@ class LightAttributes:
             self.report.warn(self.path, f"{attribute.GetName()} of a wrong type", why)
             return fallback
         return fitting
+
+    def color(self, code: float) -> np.ndarray:
+        """`color` at a time code in linear Rec. 709: of the colour space that the attribute says, or what is above it."""
+        value = np.array(self.at("color", code), dtype=float)
+        return to_rec709(self._color_space, value) if self._color_space else value
+
+    @functools.cached_property
+    def _color_space(self) -> str:
+        """That of `color`; empty for linear Rec. 709, and (reported) for one that is not known."""
+        attribute = self._found["color"]
+        space = str(Usd.ColorSpaceAPI.ComputeColorSpaceName(attribute, None) or "") if attribute else ""
+        if is_known(space):
+            return space
+        if space and space not in ("unknown", "identity"):
+            self.report.warn(self.path, f"color space {space}", f"{attribute.GetName()} is taken for linear Rec. 709")
+        return ""
 
     def first(self, name: str):
         """Value at the first frame."""
@@ -150,6 +174,9 @@ class LightAttributes:
         sources = UsdShade.Utils.GetValueProducingAttributes(UsdShade.Input(own))
         if sources and not UsdShade.Output.IsOutput(sources[0]):
             return sources[0]
+        if sources and own.GetName() == "inputs:color":
+            self.color_link, self.color_output = own, sources[0]
+            return own
         used = "its own value" if own.HasAuthoredValue() else "the schema's value"
         why = f"shader networks on lights have no carrier; {used} is used, and the light may be too bright"
         self.report.warn(self.path, f"connected {own.GetName()}", why)

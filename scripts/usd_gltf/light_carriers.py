@@ -96,7 +96,7 @@ class LightCarriers:
             area = _each_frame(world, lambda linear: world_area(light.type, size, linear))
         nits = self._normalized(light.rgb, normalize, area)
         texture = None
-        if light.texture is not None:
+        if light.texture is not None or light.texels is not None:
             texture, factor = self.pictures.rect(light)
             nits = nits * factor
             if not np.any(factor):
@@ -108,7 +108,7 @@ class LightCarriers:
         if light.type == "SphereLight":
             extras["radius"] = number(light.size["radius"])
         grown = keys_of_growth(self.frames, normalize, world, lambda linear: world_area(light.type, size, linear), nits)
-        self._animated(extras, nits, grown)
+        self._animated(light, extras, nits, grown)
         material = self.materials.light_material(Emission(self._first(nits), texture, nits.ndim == 2))
         primitive = {**self._tessellated(light.type, size, texture is not None), "material": material}
         node["mesh"] = self.document.shared("meshes", {"name": light.type, "primitives": [primitive]})
@@ -193,7 +193,7 @@ class LightCarriers:
             if mesh.motion is None:
                 grown = keys_of_growth(self.frames, light.normalize, world, mesh.area, rgb)
             glow = np.array(mesh.pieces_lit(light.material_sync)[0].glow)
-            self._animated(extras, rgb * glow, {code: row * glow for code, row in grown.items()})
+            self._animated(light, extras, rgb * glow, {code: row * glow for code, row in grown.items()})
         body = {"name": mesh.name, "primitives": lit}
         if mesh.motion is not None:
             body["extras"] = {"targetNames": mesh.motion.names}
@@ -209,7 +209,7 @@ class LightCarriers:
     def _punctual(self, light: Light, node: dict, extras: dict, candela: np.ndarray) -> None:
         """A point, or a spot if the light is shaped."""
         candela = _settled(candela)
-        self._animated(extras, candela)
+        self._animated(light, extras, candela)
         shaping = extras.get("shaping")
         if shaping is None:
             self._khr_light(node, "point", self._first(candela))
@@ -223,27 +223,24 @@ class LightCarriers:
         self._khr_light(node, "spot", self._first(candela), spot)
 
     def _distant(self, light: Light, node: dict, extras: dict) -> None:
-        """Lux on a surface that faces it; the angle of the first frame, the lux of every frame."""
+        """Lux on a surface that faces it."""
         facing = np.vectorize(_facing)(light.angle_deg, light.normalize)
         lux = _settled(_times(light.rgb, facing))
-        extras["angle"] = number(light.angle_deg[self.frames.rest] if light.angle_deg.ndim else light.angle_deg)
-        if light.angle_deg.ndim:
-            why = "the first frame's is kept; every frame has its own illuminance"
-            self.report.warn(light.path, "animated inputs:angle", why)
-        self._animated(extras, lux)
+        extras["angle"] = number(light.angle_deg)
+        self._animated(light, extras, lux)
         self._khr_light(node, "directional", self._first(lux))
         if extras.pop("shaping", None) is not None:
             self.report.warn(light.path, "shaping of a DistantLight", "it has no position to be shaped from")
 
     def _dome(self, light: Light, extras: dict) -> None:
         rgb = light.rgb
-        if light.texture is not None:
+        if light.texture is not None or light.texels is not None:
             uri, factor = self.pictures.dome(light)
             rgb = _settled(self._writable(light, rgb * factor))
             if uri is not None:
                 extras["texture"] = uri
         extras["radiance"] = numbers(self._first(rgb))
-        self._animated(extras, rgb)
+        self._animated(light, extras, rgb)
         if extras.pop("shaping", None) is not None:
             self.report.warn(light.path, "shaping of a DomeLight", "it has no position to be shaped from")
 
@@ -261,10 +258,10 @@ class LightCarriers:
         """The first frame's of (times, 3)."""
         return rgb[self.frames.rest] if rgb.ndim == 2 else rgb
 
-    def _animated(self, extras: dict, rgb: np.ndarray, between: dict[float, np.ndarray] | None = None) -> None:
+    def _animated(self, light: Light, extras: dict, rgb: np.ndarray, between: dict[float, np.ndarray] | None = None) -> None:
         """`extras.usdLux.values`, if the light varies; `between` the time codes that are sampled too."""
         if rgb.ndim == 2:
-            extras["values"] = strength_keys(self.frames, rgb, between)
+            extras["values"] = strength_keys(self.frames, rgb, between, is_mostly_dark=light.lit_at is not None)
 
 
 def _each_frame(world: np.ndarray, area) -> np.ndarray | float:

@@ -12,14 +12,18 @@ diffuse multiplier is m is carried m times as bright, which is right for everyth
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from pxr import Sdf, Usd, UsdLux
 
 from . import light_groups, light_visibility
+from .arnold_placement import placement_names
 from .light_attributes import LightAttributes, is_finite
+from .light_filters import LightFilters
 from .light_losses import report_losses
+from .light_networks import Computed, LightNetworks
+from .light_shaping import IesProfile, Shaping, read_shapings
 from .report import Notebook
 from .stage import Frames
 from .vendors import report_others
@@ -46,15 +50,6 @@ _THINNEST = 1e-6
 _BRIGHTNESS = ("intensity", "exposure", "color", "enableColorTemperature", "colorTemperature", "diffuse")
 
 
-@dataclass(frozen=True)
-class IesProfile:
-    """A photometric profile, by the file that it is in."""
-
-    file: Usd.Attribute
-    angle_scale: float
-    normalize: bool
-
-
 @dataclass
 class Light:
     """A light prim, read: everything but where it stands."""
@@ -71,19 +66,27 @@ class Light:
     """(frames, 4, 4): what `size` is scaled by, if it is animated."""
     shaping: dict | None = None
     profile: IesProfile | None = None
-    angle_deg: np.ndarray = field(default_factory=lambda: np.zeros(()))
-    """Full angle of a DistantLight: (), or (frames,)."""
+    angle_deg: float = 0.0
+    """Full angle of a DistantLight."""
     is_point: bool = False
     """Whether `treatAsPoint` is set."""
     is_line: bool = False
     """Whether `treatAsLine` is set."""
     force: bool = False
+    casts_shadows: bool = True
+    """`shadow:enable`: whether anything casts shadows from it."""
     texture: Usd.Attribute | None = None
     texture_format: str = "automatic"
+    texels: np.ndarray | None = None
+    """A picture that a network computes, (h, w, 3), which then takes the place of `texture`."""
     pole_z: bool = False
     material_sync: str = "noMaterialResponse"
     inputs: dict = field(default_factory=dict)
     visibility: dict = field(default_factory=dict)
+    others: list[Light] = field(default_factory=list)
+    """The lights in its place that it is at other times, if its shaping changes (`light_shaping`)."""
+    lit_at: float | None = None
+    """If there are others, the first time code at which it is the one that shines."""
     group: str | None = None
     """The light group that it is in, if the stage names one."""
 
@@ -113,40 +116,70 @@ def light_type(prim: Usd.Prim) -> str | None:
     return str(prim.GetTypeName()) or "Light" if prim.HasAPI(UsdLux.LightAPI) else None
 
 
-def read_light(prim: Usd.Prim, kind: str, frames: Frames, report: Notebook) -> Light:
-    """Read all inputs of a light; bad numbers are reported and made harmless."""
+def read_light(
+    prim: Usd.Prim, kind: str, frames: Frames, networks: LightNetworks, has_fog: bool, report: Notebook
+) -> Light:
+    """Read all inputs of a light; bad numbers are reported and made harmless. `has_fog` says whether the stage has any."""
     inputs = LightAttributes(prim, frames, report)
+    computed = networks.color(inputs, kind)
     light = Light(
         path=str(prim.GetPath()),
         type=kind,
-        rgb=_emission(inputs),
+        rgb=_emission(inputs, computed, LightFilters(inputs)),
+        texels=None if computed is None else computed.texels,
         normalize=_track([bool(inputs.at("normalize", code)) for code in _codes(inputs, "normalize")]),
-        shaping=_shaping(inputs, kind),
-        profile=_profile(inputs),
         # The schema names these without `inputs:`.
         is_point=kind == "SphereLight" and _flag(prim, "treatAsPoint", frames),
         is_line=kind == "CylinderLight" and _flag(prim, "treatAsLine", frames),
         force=_flag(prim, "candelabra:force", frames),
+        casts_shadows=bool(inputs.still("shadow:enable")),
         material_sync=str(prim.GetAttribute("light:materialSyncMode").Get() or "noMaterialResponse"),
         inputs=_verbatim(inputs),
-        visibility=light_visibility.read_visibility(prim, frames.first, report),
+        visibility=light_visibility.read_visibility(prim, kind, frames.first, report),
         group=light_groups.read_group(prim, frames.first, report),
     )
     _measure(light, inputs)
-    if kind == "DistantLight":
-        light.angle_deg = _track([min(inputs.size("angle", code), 360.0) for code in _codes(inputs, "angle")])
     if kind in ("RectLight", "DomeLight", "DomeLight_1"):
         light.texture = inputs.asset("texture:file")
         light.texture_format = str(inputs.first("texture:format"))
+        if computed is not None and not computed.is_tinted:
+            light.texture = None
     if kind == "DomeLight_1":
         pole = prim.GetAttribute("poleAxis").Get() or "scene"
         up = prim.GetStage().GetMetadata("upAxis")
         light.pole_z = pole == "Z" or (pole == "scene" and up == "Z")
+    _shape(light, read_shapings(inputs, kind), frames)
     report_losses(inputs)
     read = inputs.names | light_visibility.NAMES | set(light_groups.NAMES)
-    read |= {"filters", "treatAsPoint", "treatAsLine"}
-    report_others(prim, read, frames.first, report)
+    read |= {"filters", "treatAsPoint", "treatAsLine"} | placement_names(prim)
+    report_others(prim, read, frames.first, report, _in_arnolds_words(light, inputs), _idle(kind, has_fog))
     return light
+
+
+def _in_arnolds_words(light: Light, inputs: LightAttributes) -> dict[str, object]:
+    """What Arnold's parameters are, computed of the light's inputs as arnold-usd does it (read_light.cpp)."""
+    if light.type != "RectLight":
+        return {}
+    x, y = (inputs.size(name, inputs.frames.first) / 2 for name in ("width", "height"))
+    return {"vertices": [(x, -y, 0.0), (-x, -y, 0.0), (-x, y, 0.0), (x, y, 0.0)]}
+
+
+def _shape(light: Light, shapings: list[Shaping], frames: Frames) -> None:
+    """Give the light its shaping; if it has several, it becomes as many lights."""
+    rgb, found = light.rgb, []
+    for shaping in shapings:
+        shaped = light if not found else replace(light)
+        shaped.shaping, shaped.profile, shaped.angle_deg = shaping.cone, shaping.profile, shaping.angle_deg
+        if shaping.lit is not None:
+            shaped.rgb = np.where(shaping.lit[:, None], rgb, 0.0)
+            shaped.lit_at = frames.codes[int(np.flatnonzero(shaping.lit)[0])]
+        found.append(shaped)
+    light.others = [other for other in found[1:] if other.rgb.any()]
+
+
+def _idle(kind: str, has_fog: bool) -> set[str]:
+    """Arnold's parameters that a light of this kind has no use for, or none in this stage."""
+    return ({"angle"} if kind != "DistantLight" else set()) | (set() if has_fog else {"volume", "cast_volumetric_shadows"})
 
 
 def _measure(light: Light, inputs: LightAttributes) -> None:
@@ -180,9 +213,11 @@ def _flag(prim: Usd.Prim, name: str, frames: Frames) -> bool:
     return bool(attribute.Get(frames.first)) if attribute else False
 
 
-def _emission(inputs: LightAttributes) -> np.ndarray:
-    """intensity * 2^exposure * color * temperature; one row for each frame if it varies."""
-    rows = np.array([_emission_at(inputs, code) for code in _codes(inputs, *_BRIGHTNESS)])
+def _emission(inputs: LightAttributes, computed: Computed | None, filters: LightFilters) -> np.ndarray:
+    """intensity * 2^exposure * color * temperature, and what filters multiply it by; one row for each frame if it varies."""
+    varies = filters.vary or (computed is not None and computed.rows.ndim == 2)
+    codes = inputs.frames.codes if varies else _codes(inputs, *_BRIGHTNESS)
+    rows = np.array([filters.factor(code) * _emission_at(inputs, computed, code) for code in codes])
     good = np.isfinite(rows) & (rows >= 0) & (rows <= float(np.finfo(np.float32).max))
     if not good.all():
         inputs.report.warn(
@@ -195,54 +230,21 @@ def _emission(inputs: LightAttributes) -> np.ndarray:
     return rows[0] if (rows == rows[0]).all() else rows
 
 
-def _emission_at(inputs: LightAttributes, code: float) -> np.ndarray:
+def _emission_at(inputs: LightAttributes, computed: Computed | None, code: float) -> np.ndarray:
     exposure = inputs.at("exposure", code)
     scale = inputs.at("intensity", code) * (2.0**exposure if abs(exposure) < 1000 else math.nan)
     scale *= inputs.at("diffuse", code)
-    color = np.array(inputs.at("color", code), dtype=float)
-    if inputs.at("enableColorTemperature", code):
+    color = inputs.color(code) if computed is None else computed.at(inputs.frames, code)
+    if inputs.at("enableColorTemperature", code) and (computed is None or computed.is_tinted):
         kelvin = inputs.at("colorTemperature", code)
         if not is_finite(kelvin):
             return np.full(3, math.nan)
         if not 1000 <= kelvin <= 10000:
-            why = f"{kelvin:g} K is outside UsdLux's 1000 to 10000 K; the nearer end is used"
-            inputs.report.warn(inputs.path, "color temperature out of range", why)
+            why = f"{kelvin:g} K is outside UsdLux's 1000 to 10000 K; it has the colour of the nearer end, as in USD itself"
+            inputs.report.note(inputs.path, "color temperature out of range", why)
         color = color * np.array(UsdLux.BlackbodyTemperatureAsRgb(kelvin), dtype=float)
     with np.errstate(invalid="ignore", over="ignore"):
         return scale * color
-
-
-def _shaping(inputs: LightAttributes, kind: str) -> dict | None:
-    """`extras.usdLux.shaping` in degrees, or None if the light is not shaped."""
-    cone, softness = inputs.still("shaping:cone:angle"), inputs.still("shaping:cone:softness")
-    focus, tint = inputs.still("shaping:focus"), [float(c) for c in inputs.still("shaping:focusTint")]
-    if not is_finite(cone, softness, focus, *tint):
-        inputs.report.warn(inputs.path, "shaping is not finite", "the light is exported unshaped")
-        return None
-    cone, focus = min(max(cone, 0.0), 180.0), max(focus, 0.0)
-    softness = min(max(softness, 0.0), 1.0) if inputs.attribute("shaping:cone:angle") else 0.0
-    widest = 90.0 if kind in ("RectLight", "DiskLight") else 180.0
-    if cone >= widest and softness == 0.0 and focus == 0.0:
-        return None
-    return {
-        "coneAngle": cone,
-        "coneSoftness": softness,
-        "focus": focus,
-        "focusTint": [max(c, 0.0) for c in tint],
-    }
-
-
-def _profile(inputs: LightAttributes) -> IesProfile | None:
-    """The photometric profile of the first frame, if there is one."""
-    file = inputs.asset("shaping:ies:file")
-    if file is None:
-        return None
-    inputs.still("shaping:ies:file")
-    scale, normalize = inputs.still("shaping:ies:angleScale"), bool(inputs.still("shaping:ies:normalize"))
-    if not is_finite(scale):
-        inputs.report.warn(inputs.path, "shaping:ies:angleScale is not finite", "0 is used, which scales nothing")
-        scale = 0.0
-    return IesProfile(file, scale, normalize)
 
 
 def _verbatim(inputs: LightAttributes) -> dict:

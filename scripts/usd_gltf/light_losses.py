@@ -24,9 +24,9 @@ def _multipliers(inputs: LightAttributes) -> None:
 
 
 def _shadows(inputs: LightAttributes) -> None:
+    if not inputs.first("shadow:enable"):
+        return  # there are none; `linking` sees to that
     why = "a non-physical control without a carrier; the light casts plain shadows"
-    if not inputs.still("shadow:enable"):
-        inputs.report.warn(inputs.path, "shadow:enable = false", why)
     if any(inputs.still("shadow:color")):
         inputs.report.warn(inputs.path, "shadow:color", why)
     if inputs.still("shadow:distance") >= 0:
@@ -36,14 +36,6 @@ def _shadows(inputs: LightAttributes) -> None:
 
 
 def _relations(inputs: LightAttributes) -> None:
-    prim, path, report = inputs.prim, inputs.path, inputs.report
-
-    def targets(name: str) -> list:
-        relationship = prim.GetRelationship(name)
-        return relationship.GetTargets() if relationship else []
-
-    # Files before USD 21.02 say `filters`.
-    if targets("light:filters") or targets("filters"):
-        report.warn(path, "light filters", "they have no carrier; the light is exported unfiltered")
-    if str(prim.GetTypeName()).startswith("DomeLight") and targets("portals"):
-        report.note(path, "dome portals", "they only guide sampling and have no carrier")
+    portals = inputs.prim.GetRelationship("portals")
+    if str(inputs.prim.GetTypeName()).startswith("DomeLight") and portals and portals.GetTargets():
+        inputs.report.note(inputs.path, "dome portals", "they only guide sampling and have no carrier")

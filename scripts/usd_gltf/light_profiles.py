@@ -15,7 +15,6 @@ from .gltf_document import Document, number
 from .light_inputs import Light
 from .report import Notebook
 from .source_hash import Dependencies
-from .stage import Frames
 
 WITHOUT_CONE = {"coneAngle": 180.0, "coneSoftness": 0.0, "focus": 0.0, "focusTint": [0.0] * 3}
 """`extras.usdLux.shaping` of a light that nothing but a profile shapes."""
@@ -24,8 +23,8 @@ WITHOUT_CONE = {"coneAngle": 180.0, "coneSoftness": 0.0, "focus": 0.0, "focusTin
 class LightProfiles:
     """Carries the profiles of lights; each file once."""
 
-    def __init__(self, document: Document, dependencies: Dependencies, frames: Frames, report: Notebook) -> None:
-        self.document, self.frames, self.report = document, frames, report
+    def __init__(self, document: Document, dependencies: Dependencies, report: Notebook) -> None:
+        self.document, self.report = document, report
         self.files = AssetFiles(dependencies)
         self._carried: dict[str, str] = {}
         """The file beside the glTF by where the profile is."""
@@ -34,7 +33,7 @@ class LightProfiles:
         """`extras.usdLux.shaping.ies` of a light; None if it has no profile, or (reported) none that can be read."""
         if light.profile is None:
             return None
-        uri = self._uri(light, light.profile.file)
+        uri = self._uri(light, light.profile.file, light.profile.code)
         if uri is None:
             return None
         ies: dict = {"file": uri}
@@ -44,12 +43,12 @@ class LightProfiles:
             ies["normalize"] = True
         return ies
 
-    def _uri(self, light: Light, attribute: Usd.Attribute) -> str | None:
+    def _uri(self, light: Light, attribute: Usd.Attribute, code: float) -> str | None:
         """The file beside the glTF."""
-        place = place_of(attribute, self.frames.first)
+        place = place_of(attribute, code)
         if place not in self._carried:
             instead = "the light shines without it, as bright as if every number in it were 1"
-            file = self.files.read(light.path, attribute, self.frames.first, instead, self.report, "IES profile")
+            file = self.files.read(light.path, attribute, code, instead, self.report, "IES profile")
             if file is None:  # reported for each light
                 return None
             stem, suffix = os.path.splitext(file.name)

@@ -7,6 +7,7 @@ and the light's brightness follows the mean of the others.
 
 from __future__ import annotations
 
+import hashlib
 import os
 from dataclasses import dataclass
 
@@ -66,7 +67,7 @@ class LightTextures:
         """URI of a dome's picture, and the factor of its radiance; 0 if it cannot be read."""
         if light.path not in self._domes:
             shown = None
-            if light.texture_format in ("automatic", "latlong"):
+            if light.texels is not None or light.texture_format in ("automatic", "latlong"):
                 shown = self._shown(light, dome=True)
             else:
                 why = f"only pictures of latitude and longitude are read; {_DARK}"
@@ -80,6 +81,10 @@ class LightTextures:
 
     def _shown(self, light: Light, dome: bool) -> Shown | None:
         """The light's picture; None (reported) if there is none that can be read."""
+        if light.texels is not None:
+            digest = hashlib.blake2b(light.path.encode(), digest_size=4).hexdigest()
+            name = f"{light.path.rsplit('/', 1)[-1]}_color_{digest}"
+            return self._baked(light, name, "what its network computes", light.texels)
         attribute = light.texture
         asset = attribute.Get(self.frames.first)
         if asset is not None and UDIM in asset.path:
@@ -139,8 +144,11 @@ class LightTextures:
         stem = os.path.splitext(file.name)[0]
         if not picture.linear:
             return Shown(f"{stem}.png", png_bytes(picture.texels), None, np.ones(3))
-        baked = bake(picture.texels[:, :, :3])
-        why = f"{file.name} becomes a PNG of eight bits and a factor; its total is kept, its grain is {baked.grain:.1%}"
+        return self._baked(light, stem, file.name, picture.texels[:, :, :3])
+
+    def _baked(self, light: Light, stem: str, source: str, texels: np.ndarray) -> Shown:
+        baked = bake(texels)
+        why = f"{source} becomes a PNG of eight bits and a factor; its total is kept, its grain is {baked.grain:.1%}"
         if baked.grain > COARSE:
             why += ": its darker parts are coarse beside its brightest"
             self.report.warn(light.path, "picture of a light baked coarsely", why)

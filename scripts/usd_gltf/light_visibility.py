@@ -44,6 +44,8 @@ _FLAGS = (
     *((f"{prefix}visibility:{ray}", kind) for prefix in ("cycles:", "cycles:object:", "primvars:cycles:object:")
       for ray, kind in (("camera", "camera"), ("glossy", "reflections"), ("shadow", "shadows"))),
 )  # fmt: skip
+_HIDDEN = ("RectLight", "DiskLight", "SphereLight", "CylinderLight")
+"""Lights whose shape neither the camera sees nor anything is shadowed by, unless the stage says it (`carriers.md`)."""
 _MASKS = arnold_names("visibility")
 _PATTERNS = (f"primvars:{_KARMA}", _KARMA)
 _BITS = {"camera": 1, "shadows": 2, "reflections": 64}
@@ -53,20 +55,23 @@ NAMES = frozenset([name for name, _ in _FLAGS]) | {*_MASKS, *_PATTERNS}
 """All attributes that are read here."""
 
 
-def read_visibility(prim: Usd.Prim, code: float, report: Notebook) -> dict[str, bool]:
-    """`camera`, `reflections` and `shadows`, each only if an attribute says so."""
+def read_visibility(prim: Usd.Prim, kind: str, code: float, report: Notebook) -> dict[str, bool]:
+    """`camera`, `reflections` and `shadows` of a light of some kind, each only if an attribute says so. What is so anyhow
+    is not noted."""
+    default = kind not in _HIDDEN
     found: dict[str, tuple[bool, str]] = {}
     said: dict[str, list[str]] = {}
-    for kind, seen, source in _statements(prim, code, report):
-        if kind not in found:
-            found[kind] = seen, source
-            said.setdefault(source, []).append(f"visibility.{kind} is {seen}")
-        elif found[kind][0] != seen:
-            why = f"{found[kind][1]} says {found[kind][0]} of visibility.{kind}, which is used"
+    for ray, seen, source in _statements(prim, code, report):
+        if ray not in found:
+            found[ray] = seen, source
+            if seen != (default or ray == "reflections"):
+                said.setdefault(source, []).append(f"visibility.{ray} is {seen}")
+        elif found[ray][0] != seen:
+            why = f"{found[ray][1]} says {found[ray][0]} of visibility.{ray}, which is used"
             report.warn(prim.GetPath(), f"{source} overruled", why)
     for source, meanings in said.items():
         report.note(prim.GetPath(), f"{source} = {_value(prim, source, code)}", ", ".join(meanings))
-    return {kind: seen for kind, (seen, _) in found.items()}
+    return {ray: seen for ray, (seen, _) in found.items()}
 
 
 def _statements(prim: Usd.Prim, code: float, report: Notebook):

@@ -2,7 +2,8 @@
 
 UsdLux has a collection for each, `lightLink` and `shadowLink`; usd-core computes what they hold. A *link set* is what
 a collection holds of the geometry that is exported. Equal sets are one, and a set of everything is none, so a stage
-whose lights light everything exports nothing of this. The form in the file is in `src/ingest/carriers.md`.
+whose lights light everything exports nothing of this. The form in the file is in `src/ingest/carriers.md`. A light whose
+`shadow:enable` is off has a shadow link that holds nothing.
 
 Prims are asked for by their paths on the stage, those of instances by the paths of their proxies. What a
 PointInstancer places has two paths, the prototype's and the instancer's. A collection that names the prototype or
@@ -37,13 +38,13 @@ class Linking:
 
     def __init__(self, stage: Usd.Stage, prims: list[Prim], report: Notebook) -> None:
         self.stage, self.report = stage, report
-        self._queries: list[_Query] = []
+        self._queries: list[_Query | _Nothing] = []
         self._number: dict = {}
         """Of each query its place among them; -1 for one that holds everything by what it says."""
         lights: dict[str, list[int]] = {}
         for prim, _ in _all(prims):
             if prim.light is not None and prim.light_path not in lights:
-                lights[prim.light_path] = [self._query(prim.light_path, link) for link in _LINKS]
+                lights[prim.light_path] = self._queries_of(prim.light_path, prim.light.casts_shadows)
         self._members: dict[Place, tuple[bool, ...]] = {}
         self._sets: list[int | None] = []
         self._lights: dict[str, list[int | None]] = {}
@@ -90,6 +91,17 @@ class Linking:
         return self._meshes[key]
 
     # -- sets ------------------------------------------------------------------------------------
+
+    def _queries_of(self, path: str, casts_shadows: bool) -> list[int]:
+        """The numbers of a light's queries, in the order of `_LINKS`. With `shadow:enable` off nothing casts its shadows,
+        whatever its collection says."""
+        return [self._query(path, link) if casts_shadows or link == "lightLink" else self._nothing() for link in _LINKS]
+
+    def _nothing(self) -> int:
+        if None not in self._number:
+            self._number[None] = len(self._queries)
+            self._queries.append(_Nothing())
+        return self._number[None]
 
     def _query(self, path: str, link: str) -> int:
         """The number of the query of a light's collection; -1 if it holds everything by what it says."""
@@ -212,6 +224,14 @@ class _Query:
             if any(prefix in self.named for prefix in at.GetPrefixes()):
                 return self.query.IsPathIncluded(at)
         return self.query.IsPathIncluded(chain[-1])
+
+
+class _Nothing:
+    """A collection that holds nothing."""
+
+    def holds(self, place: tuple[Sdf.Path, ...]) -> bool:
+        """Whether it holds what stands at a place."""
+        return False
 
 
 class LinkSubsets:

@@ -341,7 +341,7 @@ class MeshReader:
         """A primvar on the corners of the mesh, or of its refined surface; None if there is none."""
         if (name, width) in mesh.carried:
             return mesh.carried[name, width]
-        found = read_primvar(mesh.prim, name, width, self.code, mesh.counts, mesh.corners, self.report)
+        found = read_primvar(mesh.prim, name, width, self.code, mesh.counts, mesh.corners, self.report, self.polygons.frames)
         if found is not None and mesh.surface is not None:
             found = mesh.carried[name, width] = mesh.surface.carry(found)
         return found

@@ -19,6 +19,7 @@ from .prim_tree import Prim
 from .report import Notebook
 from .stage import Frames
 from .transforms import SHEAR_TOLERANCE, decompose, split_shear
+from .vanishing import hide
 
 _DEFAULTS = {"translation": [0.0] * 3, "rotation": [0.0, 0.0, 0.0, 1.0], "scale": [1.0] * 3}
 
@@ -64,6 +65,7 @@ class NodeWriter:
                 self._still[id(prim)] = _still(prim.local)
             index, outer = self._placed(path, prim.name, *self._still[id(prim)])
         self._fill(index, prim, path, world, chain)
+        outer = self._seen(prim, outer)
         if not prim.resets:
             return outer
         # The child of no one: it stands by its own matrix alone.
@@ -72,7 +74,7 @@ class NodeWriter:
 
     def _fill(self, index: int, prim: Prim, path: str, world: np.ndarray, chain: Place) -> None:
         """Content and children of a node."""
-        node = self.document.nodes[index]
+        node, others = self.document.nodes[index], []
         if prim.camera is not None:
             camera, extras = prim.camera
             node["camera"] = self.document.shared("cameras", camera)
@@ -84,6 +86,7 @@ class NodeWriter:
         if prim.light is not None:
             self.carriers.carry(prim.light, node, world, mesh)
             node["extras"]["usdLux"].update(self.linking.light(prim))
+            others = self._others(prim, path, world, chain)
         elif mesh is not None:
             node["mesh"] = self._mesh(mesh)
             keys = prim.mesh.glow_keys()
@@ -95,12 +98,23 @@ class NodeWriter:
         if mesh is not None and mesh.motion is not None:
             mesh.motion.animate(self.document, index)
             self.report.count("animation channels")
-        children = [self._prim(child, path + child.path[len(prim.path) :], world, chain) for child in prim.children]
+        children = others + [self._prim(child, path + child.path[len(prim.path) :], world, chain) for child in prim.children]
         for prototype, placements in prim.instances:
             children += self._instances(prototype, placements, path, world, (prim.path, *chain))
         children = [child for child in children if child >= 0]
         if children:
             node["children"] = children
+
+    def _others(self, prim: Prim, path: str, world: np.ndarray, chain: Place) -> list[int]:
+        """Nodes of the lights that a light of several shapings is at other times."""
+        nodes = []
+        for light in prim.light.others:
+            extras = {"usdPath": f"{path}[shaping {light.lit_at:.9g}]", **self.linking.node(prim, chain)}
+            node = {"name": prim.name, "extras": extras}
+            nodes.append(self.document.node(node))
+            self.carriers.carry(light, node, world, None)
+            node["extras"]["usdLux"].update(self.linking.light(prim))
+        return nodes
 
     def _mesh(self, mesh: MeshSource) -> int:
         if id(mesh) not in self._meshes:
@@ -130,8 +144,15 @@ class NodeWriter:
                 place = _place(*(part[position] for part in static[:3]))
                 index, outer = self._placed(name, prototype.name, place, None)
             self._fill(index, prototype, name, world @ matrix if prototype.lit else world, chain)
-            nodes.append(outer)
+            nodes.append(self._seen(prototype, outer))
         return nodes
+
+    def _seen(self, prim: Prim, node: int) -> int:
+        """The index of a prim's outermost node, which hides it where it vanishes."""
+        if prim.seen is None:
+            return node
+        self.report.count("animation channels")
+        return hide(self.document, self.frames, node, prim.name, prim.seen)
 
     def _placed(self, path: str, name: str, place: dict, outside: dict | None) -> tuple[int, int]:
         """The index of a node that stands still, and that of the node to hang under the parent."""

@@ -10,10 +10,11 @@ from pxr import Usd, UsdGeom
 from . import gprims
 from .animation import NOISE
 from .normals import Split
-from .primvars import CornerValues, as_rows, normals_may_vary, read_normals
+from .primvars import CornerValues, as_rows, normals_may_vary, normals_vary, read_normals
 from .report import Notebook
 from .skinning import Skinning
 from .stage import Frames, changes
+from .velocities import points_at, points_move
 
 _TOPOLOGY = ("faceVertexCounts", "faceVertexIndices")
 
@@ -53,12 +54,18 @@ class PolygonReader:
         names = gprims.SIZES if is_gprim else ("points", *_TOPOLOGY)
         changed = [name for name in names if changes(prim.GetAttribute(name), self.frames)]
         found.changed = [f"animated {name}" for name in changed]
+        if not is_gprim and points_move(prim, self.frames, self.report.about("animation")):
+            found.changed.append("animated points (velocities)")
         authored, corners = found.points, found.corners
         if not is_gprim and self.skinning.may_deform(prim):
             found.changed.append("skinned mesh that deforms")
+        # A subdivision surface has normals of its own.
+        turns = not is_gprim and _is_polygonal(prim) and normals_vary(prim, self.frames)
+        if turns and not found.changed:
+            found.changed.append("animated normals")
         if found.changed:
             found.points, _ = self._pose(prim, authored, corners, None)
-            found.deforms = self._is_carried(prim, found, changed)
+            found.deforms = self._is_carried(prim, found, changed, turns)
         normals = self._normals(prim, code, found)
         found.points, found.normals = self._pose(prim, authored, corners, normals)
         if found.deforms and normals is not None:
@@ -88,12 +95,12 @@ class PolygonReader:
             kept = f"{why}; {shape} of frame {self.frames.first:g} is used"
             self.report.about("animation").warn(prim.GetPath(), what, kept)
 
-    def _is_carried(self, prim: Usd.Prim, found: Polygons, changed: list[str]) -> bool:
-        """Whether a mesh that may deform does, and can be carried; reported if it cannot."""
+    def _is_carried(self, prim: Usd.Prim, found: Polygons, changed: list[str], turns: bool) -> bool:
+        """Whether a mesh that may deform does, or its normals turn, and that can be carried; reported if it cannot."""
         try:
             if any(name in _TOPOLOGY for name in changed):
                 raise Unlike("topology that changes has no carrier")
-            return any(self._moves(prim, code, found) for code in self.frames.codes)
+            return turns or any(self._moves(prim, code, found) for code in self.frames.codes)
         except Unlike as why:
             self.lose(prim, found, why)
             return False
@@ -117,7 +124,7 @@ class PolygonReader:
             if not np.array_equal(shape.counts, first.counts):
                 raise Unlike(f"it has other faces at frame {code:g}")
             return shape.points, normals
-        points = as_rows(prim.GetAttribute("points").Get(code), 3)
+        points = points_at(prim, code)
         if len(points) != len(first.points):
             raise Unlike(f"it has {len(first.points)} points at the first frame, {len(points)} at frame {code:g}")
         try:
@@ -136,7 +143,7 @@ class PolygonReader:
         """The normals authored at a time."""
         if prim.GetTypeName() in gprims.TYPES:
             return self._gprim(prim, code).normals
-        return read_normals(prim, code, found.counts, found.corners, self.report, over_time=found.deforms)
+        return read_normals(prim, code, found.counts, found.corners, self.report, None if found.deforms else self.frames)
 
     def _pose(self, prim: Usd.Prim, points: np.ndarray, corners: np.ndarray, normals: CornerValues | None):
         """Points and normals in the pose of the first frame; no joint bends an intrinsic gprim."""
@@ -153,7 +160,7 @@ class PolygonReader:
     def _mesh(self, prim: Usd.Prim) -> Polygons | None:
         """What a Mesh is at the first frame, not yet posed; None (reported) if that is no mesh."""
         path, mesh, code = prim.GetPath(), UsdGeom.Mesh(prim), self.frames.first
-        points = as_rows(mesh.GetPointsAttr().Get(code), 3)
+        points = points_at(prim, code)
         counts = as_rows(mesh.GetFaceVertexCountsAttr().Get(code), 1, int)
         corners = as_rows(mesh.GetFaceVertexIndicesAttr().Get(code), 1, int)
         if not (len(points) and len(counts) and len(corners)):
@@ -168,3 +175,7 @@ class PolygonReader:
             self.report.warn(path, "mesh with a broken topology", f"{why}; it is left out")
             return None
         return Polygons(points, counts, corners)
+
+
+def _is_polygonal(prim: Usd.Prim) -> bool:
+    return UsdGeom.Mesh(prim).GetSubdivisionSchemeAttr().Get() == UsdGeom.Tokens.none

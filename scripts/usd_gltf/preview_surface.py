@@ -1,7 +1,7 @@
 """UsdPreviewSurface to glTF's metallic-roughness.
 
 Defaults are those of the UsdPreviewSurface specification. The specular workflow becomes a dielectric
-with `KHR_materials_specular` (reported: an approximation); displacement has no carrier.
+whose F0 is its specular colour, and F90 white, by `KHR_materials_specular`; displacement has no carrier.
 """
 
 from __future__ import annotations
@@ -37,8 +37,8 @@ class PreviewSurfaces:
             value = read["specularColor"]
             color = color_of(value, (0.0, 0.0, 0.0))
             tint = Value(tuple(c / _F0 for c in color), value.texture and rescaled(value.texture, 1 / _F0))
-            read = {**read, "specularTint": tint}
-            self.report.warn(path, "specular workflow", f"it becomes a dielectric with a specular colour (F0 up to {max(color):g})")
+            # The colour is F0 as it stands, whatever the index of refraction.
+            read = {**read, "specularTint": tint, "ior": Value()}
         look = self.builder.look(path, read, is_dielectric=specular_workflow)
         if read["displacement"].texture or number_of(read["displacement"], 0.0) != 0.0:
             self.report.warn(path, "displacement", "it has no carrier")

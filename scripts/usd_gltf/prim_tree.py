@@ -10,24 +10,47 @@ from __future__ import annotations
 import bisect
 import functools
 import math
-from dataclasses import dataclass, field
+import re
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from pxr import Gf, Usd, UsdGeom, UsdLux, UsdShade
 
 from . import gprims
+from .arnold_placement import placement
 from .cameras import read_camera
-from .fog import read_fog
+from .fog import is_fog, read_fog
 from .instancers import Placements, read_placements
-from .light_inputs import Light, light_type, read_light
+from .light_attributes import arnold_names
+from .light_filters import MULTIPLIER
+from .light_inputs import SIZES, Light, light_type, read_light
+from .light_networks import LightNetworks
 from .mesh import MeshReader, MeshSource
 from .progress import Progress
 from .report import Notebook
 from .stage import PREDICATE, PROTOTYPE_PREDICATE, Frames, changes
 from .transforms import between, column
+from .vanishing import dark_while_hidden, holds_camera, holds_light, is_darkened, is_drawn, seen_over_time
 
 _POLE_Z = np.array([[1, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]], dtype=float)
 """DomeLight_1 with its pole along Z: local +Y goes to +Z, +Z to -Y (usdLux/schema.usda)."""
+_SETTINGS = re.compile(r"Arnold(NodeGraph|Options|\w+Filter|Driver\w+|ColorManager\w+|Imager\w+)(?<!LightFilter)")
+"""arnold-usd's types that are nothing in the scene: graphs of shaders, of which those that read them say what is lost, and
+how Arnold renders and writes pictures."""
+
+
+@dataclass(frozen=True)
+class Seen:
+    """At which of the sampled time codes a prim is seen, as far as its visibility and that above it change."""
+
+    at: np.ndarray | None = None
+    drawn: np.ndarray | None = None
+    """The same, of the nodes that hide what is drawn below them."""
+    is_left_out: bool = False
+    """Whether what is drawn is hidden at the first frame, which counts."""
+
+
+_ALWAYS = Seen()
 
 
 @dataclass
@@ -47,6 +70,8 @@ class Prim:
     fog: dict | None = None
     instances: list[tuple[Prim, Placements]] = field(default_factory=list)
     children: list[Prim] = field(default_factory=list)
+    seen: np.ndarray | None = None
+    """At which of `Frames.codes` it is seen, with all below it, if that changes and is drawn."""
     lit: bool = False
     """Whether there is a light in the subtree (then world matrices matter)."""
 
@@ -66,19 +91,23 @@ class PrimTree:
         frames: Frames,
         purposes: tuple[str, ...],
         meters_per_unit: float,
+        networks: LightNetworks,
         report: Notebook,
         progress: Progress,
     ) -> None:
         self.stage, self.meshes, self.frames, self.progress = stage, meshes, frames, progress
-        self.purposes, self.meters_per_unit, self.report = purposes, meters_per_unit, report
+        self.purposes, self.meters_per_unit, self.networks, self.report = purposes, meters_per_unit, networks, report
         self.lights = report.about("lights")
         self._prototypes: dict[str, Prim | None] = {}
         self._open: set[str] = set()
         self._lights: dict[tuple[str, str], Light] = {}
+        self._dark: dict[tuple[str, bytes], Light] = {}
         self._geometry_lights: dict[str, Usd.Prim] = {}
         self._lit_geometry: set[str] = set()
+        self._has_fog = False
         for prim in Usd.PrimRange(stage.GetPseudoRoot(), PREDICATE):
             progress.total += 1
+            self._has_fog |= is_fog(prim)
             if prim.GetTypeName() == "GeometryLight":
                 light = UsdGeom.Imageable(prim)
                 if light.ComputeVisibility(frames.first) == UsdGeom.Tokens.invisible:
@@ -97,20 +126,21 @@ class PrimTree:
                 self.lights.warn(light.GetPath(), "GeometryLight emits nothing", why)
         return [prim for prim in found if prim is not None]
 
-    def _compile(self, prim: Usd.Prim, purpose, predicate) -> Prim | None:
-        """The tree below `prim`, or None if there is nothing in it to export."""
+    def _compile(self, prim: Usd.Prim, purpose, predicate, above: Seen = _ALWAYS) -> Prim | None:
+        """The tree below `prim`, or None if there is nothing in it to export. `above` says how what is above hides it."""
         if prim.IsA(UsdShade.Material) or prim.IsA(UsdShade.NodeGraph):
             return None
         path = prim.GetPath()
         self.progress.read(str(path))
-        shown = True
+        shown, seen, own = True, above, None
         if prim.IsA(UsdGeom.Imageable):
             imageable = UsdGeom.Imageable(prim)
-            visibility = imageable.GetVisibilityAttr()
-            if changes(visibility, self.frames):
-                report = self.lights if _holds_light(prim) else self.report.about("animation")
-                report.warn(path, "animated visibility", "it has no carrier; the first frame's is used")
-            if visibility.Get(self.frames.first) == UsdGeom.Tokens.invisible:
+            if changes(imageable.GetVisibilityAttr(), self.frames):
+                seen, own = self._seen(prim, imageable, above)
+                if not seen.at.any():
+                    self.report.count("invisible prims")
+                    return None
+            elif imageable.GetVisibilityAttr().Get(self.frames.first) == UsdGeom.Tokens.invisible:
                 self.report.count("invisible prims")
                 return None
             purpose = imageable.ComputePurposeInfo(purpose) if purpose else imageable.ComputePurposeInfo()
@@ -122,15 +152,19 @@ class PrimTree:
                 self.report.warn(path, "transform that is not finite", "the prim and all below it are left out")
                 return None
         if prim.IsA(UsdGeom.PointInstancer):
-            if shown:
+            if shown and not seen.is_left_out:
                 self._instances(prim, compiled)
         else:
-            if shown:
-                self._content(prim, compiled)
+            if shown and (not seen.is_left_out or is_darkened(prim)):
+                self._content(prim, compiled, seen)
             for child in prim.GetFilteredChildren(predicate):
-                below = self._compile(child, purpose, predicate)
+                below = self._compile(child, purpose, predicate, seen)
                 if below is not None:
                     compiled.children.append(below)
+        if compiled.camera is not None or compiled.light is not None:
+            placed = placement(prim, self.frames.first, self.report.about("cameras") if compiled.camera else self.lights)
+            if placed is not None:
+                _insert(compiled, placed)
         if compiled.light is not None and compiled.light.pole_z:
             _insert(compiled, _POLE_Z)
         if compiled.light is not None and compiled.light.stretch is not None:
@@ -141,12 +175,29 @@ class PrimTree:
                 _insert(compiled, movement)
         if compiled.is_empty:
             return None
+        mask = seen.drawn if compiled.resets else own
+        compiled.seen = mask if mask is not None and is_drawn(prim) else None
+        if compiled.light is not None and compiled.light.type in SIZES and compiled.light.visibility.get("shadows"):
+            compiled.seen = seen.at  # its shape is there even while it is dark
         compiled.lit = (
             compiled.light is not None
             or any(child.lit for child in compiled.children)
             or any(prototype.lit for prototype, _ in compiled.instances)
         )
         return compiled
+
+    def _seen(self, prim: Usd.Prim, imageable: UsdGeom.Imageable, above: Seen) -> tuple[Seen, np.ndarray | None]:
+        """How a prim whose visibility changes is seen, and when a node around it is to be; None if there is to be none."""
+        own = seen_over_time(imageable, self.frames)
+        at = own if above.at is None else above.at & own
+        if not is_drawn(prim):
+            return replace(above, at=at), None
+        if holds_camera(prim):
+            report = self.lights if holds_light(prim) else self.report.about("animation")
+            why = "with a camera below it, it has no carrier; the first frame's is used, but by lights without a mesh"
+            report.warn(prim.GetPath(), "animated visibility", why)
+            return replace(above, at=at, is_left_out=above.is_left_out or not own[self.frames.rest]), None
+        return replace(above, at=at, drawn=own if above.drawn is None else above.drawn & own), own
 
     def _local(self, prim: Usd.Prim) -> tuple[np.ndarray, bool]:
         """The local matrix, or one for each frame, and whether it ignores the parents'."""
@@ -159,7 +210,7 @@ class PrimTree:
             return matrices[0], resets
         return column(xformable.GetLocalTransformation(self.frames.first)), resets
 
-    def _content(self, prim: Usd.Prim, compiled: Prim) -> None:
+    def _content(self, prim: Usd.Prim, compiled: Prim, seen: Seen) -> None:
         """What the prim itself is: a mesh, a light, a camera, fog, or something without a carrier."""
         path = prim.GetPath()
         kind = str(prim.GetTypeName())
@@ -170,6 +221,10 @@ class PrimTree:
             light_prim = geometry_light or prim
             is_light = light_type(light_prim) is not None
             compiled.mesh = self.meshes.read(prim)
+            for name in filter(prim.HasAttribute, () if is_light else arnold_names("light")):
+                if prim.GetAttribute(name).Get(self.frames.first):
+                    why = "Arnold's mesh lights are not read; all that it emits is the glow of its material"
+                    self.lights.warn(path, name, why)
             if compiled.mesh is not None and is_light:
                 compiled.light = self._light(light_prim, "MeshLight")
                 compiled.light_path = str(light_prim.GetPath())
@@ -182,11 +237,13 @@ class PrimTree:
         elif light_type(prim) is not None:
             compiled.light = self._light(prim, light_type(prim))
             compiled.light_path = str(path)
-        elif prim.IsA(UsdLux.LightFilter):
-            self.lights.warn(path, kind, "light filters have no carrier")
+            if seen.at is not None and is_darkened(prim) and not seen.at.all():
+                compiled.light = self._vanishing(compiled.light, seen.at)
+        elif prim.IsA(UsdLux.LightFilter) or kind == MULTIPLIER:
+            pass  # a light that names it says what becomes of it
         elif compiled.fog is None and (prim.IsA(UsdGeom.Gprim) or kind == "Volume"):
             self.report.warn(path, kind, "this kind of geometry has no carrier; it is left out")
-        elif kind and not prim.GetPrimTypeInfo().GetSchemaType():
+        elif kind and not prim.GetPrimTypeInfo().GetSchemaType() and not _SETTINGS.fullmatch(kind):
             report = self.lights if "Light" in kind else self.report.about("other")
             report.warn(path, f"unknown type {kind}", "no schema is registered for it")
 
@@ -195,8 +252,15 @@ class PrimTree:
         source = prim.GetPrimInPrototype() if prim.IsInstanceProxy() else prim
         key = (str(source.GetPath()), kind)
         if key not in self._lights:
-            self._lights[key] = read_light(prim, kind, self.frames, self.lights)
+            self._lights[key] = read_light(prim, kind, self.frames, self.networks, self._has_fog, self.lights)
         return self._lights[key]
+
+    def _vanishing(self, light: Light, seen: np.ndarray) -> Light | None:
+        """The light, dark while it is hidden; None if it is never seen."""
+        key = (light.path, seen.tobytes())
+        if key not in self._dark:
+            self._dark[key] = dark_while_hidden(light, seen)
+        return self._dark[key] if seen.any() else None
 
     def _instances(self, prim: Usd.Prim, compiled: Prim) -> None:
         """The prototypes of a PointInstancer and where they are put."""
@@ -278,8 +342,3 @@ def _insert(compiled: Prim, matrix: np.ndarray) -> None:
     for child in compiled.children:
         if not child.resets:
             child.local = np.linalg.pinv(matrix) @ child.local
-
-
-def _holds_light(prim: Usd.Prim) -> bool:
-    """Whether the prim or anything below it is a light."""
-    return any(light_type(below) is not None for below in Usd.PrimRange(prim, PROTOTYPE_PREDICATE))

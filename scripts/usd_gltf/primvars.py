@@ -8,6 +8,7 @@ import numpy as np
 from pxr import Usd, UsdGeom
 
 from .report import Notebook
+from .stage import Frames, changes
 
 
 @dataclass
@@ -63,14 +64,14 @@ def read_primvar(
     counts: np.ndarray,
     corners: np.ndarray,
     report: Notebook,
-    over_time: bool = False,
+    frames: Frames | None = None,
 ) -> CornerValues | None:
     """The primvar `name` (inherited ones too) with `width` numbers a value; None if there is none. It is reported if
-    it varies, unless it is read `over_time`."""
+    it differs between two of the `frames`, which are left out where it is read at each of them."""
     primvar = UsdGeom.PrimvarsAPI(prim).FindPrimvarWithInheritance(name)
     if not primvar or not primvar.HasValue():
         return None
-    if not over_time and primvar.ValueMightBeTimeVarying() and primvar.GetAttr().GetNumTimeSamples() > 1:
+    if frames is not None and (changes(primvar.GetAttr(), frames) or changes(primvar.GetIndicesAttr(), frames)):
         report.about("animation").warn(prim.GetPath(), f"animated primvars:{name}", "the first frame's values are used")
     interpolation = primvar.GetInterpolation()
     values = as_rows(primvar.Get(code), width).reshape(-1, width)
@@ -92,11 +93,21 @@ def normals_may_vary(prim: Usd.Prim) -> bool:
     return bool(attribute) and attribute.ValueMightBeTimeVarying()
 
 
+def normals_vary(prim: Usd.Prim, frames: Frames) -> bool:
+    """Whether what `read_normals` finds differs between two of the frames."""
+    if not normals_may_vary(prim):
+        return False
+    primvar = UsdGeom.PrimvarsAPI(prim).FindPrimvarWithInheritance("normals")
+    if primvar and primvar.HasValue():
+        return changes(primvar.GetAttr(), frames) or changes(primvar.GetIndicesAttr(), frames)
+    return changes(prim.GetAttribute("normals"), frames)
+
+
 def read_normals(
-    prim: Usd.Prim, code: float, counts: np.ndarray, corners: np.ndarray, report: Notebook, over_time: bool = False
+    prim: Usd.Prim, code: float, counts: np.ndarray, corners: np.ndarray, report: Notebook, frames: Frames | None = None
 ) -> CornerValues | None:
     """`primvars:normals`, else the `normals` attribute of a point-based prim."""
-    found = read_primvar(prim, "normals", 3, code, counts, corners, report, over_time)
+    found = read_primvar(prim, "normals", 3, code, counts, corners, report, frames)
     if found is not None:
         return found
     attribute = prim.GetAttribute("normals")

@@ -26,6 +26,7 @@ class Report:
         self.warnings: list[dict[str, str]] = []
         self.notes: list[dict[str, str]] = []
         self.counts: Counter[str] = Counter()
+        self._idle: dict[str, tuple[dict[str, str], set[str], set[str]]] = {}
         self._seen: set[tuple[str, str, str]] = set()
 
     def about(self, category: str) -> Notebook:
@@ -38,6 +39,19 @@ class Report:
         if key not in self._seen:
             self._seen.add(key)
             lines.append({"category": category, "path": key[1], "what": what, "why": why})
+
+    def add_idle(self, category: str, path: str, names: Iterable[str]) -> None:
+        """Add attributes of a prim that do not change the picture. All of a category are one note, for nobody has to do
+        anything about them."""
+        if category not in self._idle:
+            note = {"category": category, "path": path, "what": "attributes without effect", "why": ""}
+            self.notes.append(note)
+            self._idle[category] = note, set(), set()
+        note, prims, all_names = self._idle[category]
+        prims.add(path)
+        all_names.update(names)
+        who = f"those of {len(prims)} prims" if len(prims) > 1 else "they"
+        note["why"] = f"{who} do not change the picture: {', '.join(sorted(all_names))}"
 
     def warnings_in(self, categories: Iterable[str]) -> list[dict[str, str]]:
         """The warnings that belong to one of `categories`."""
@@ -93,6 +107,10 @@ class Notebook:
     def note(self, path: object, what: str, why: str) -> None:
         """Say once how `what` at prim `path` was read; nothing of it is lost."""
         self._report.add(self._report.notes, self._category, path, what, why)
+
+    def idle(self, path: object, names: Iterable[str]) -> None:
+        """Say that attributes of prim `path` do not change the picture."""
+        self._report.add_idle(self._category, str(path), names)
 
     def count(self, what: str, by: int = 1) -> None:
         """Add to a count of exported things."""

@@ -1,12 +1,14 @@
 """What else is authored on a light or a camera: attributes of renderers and of tools that have no carrier.
 
-Whatever is neither in the prim's schema nor read elsewhere is listed, one line for each prim and
-namespace. What has no effect on a picture, or a value that changes nothing, is a note; the rest is
-a warning.
+Whatever is neither in the prim's schema nor read elsewhere is listed. What has no effect on a picture, or a value
+that changes nothing, is named in one note for the whole stage; the rest is a warning, one for each prim and namespace.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Set
+
+import numpy as np
 from pxr import Sdf, Usd
 
 from .primvars import as_rows
@@ -27,17 +29,26 @@ _NEUTRAL = {
     "diffuse": 1.0, "specular": 1.0, "sss": 1.0, "indirect": 1.0, "volume": 1.0, "spread": 1.0,
     "roundness": 0.0, "soft_edge": 0.0, "shadow_density": 1.0, "cast_shadows": True,
     "cast_volumetric_shadows": True, "shadow_color": (0.0, 0.0, 0.0), "position": (0.0, 0.0, 0.0),
-    "direction": (0.0, 0.0, -1.0), "up": (0.0, 1.0, 0.0), "transmission": 0.0, "max_bounces": 999,
+    "direction": (0.0, 0.0, -1.0), "look_at": (0.0, 0.0, -1.0), "up": (0.0, 1.0, 0.0), "transmission": 0.0, "max_bounces": 999,
     "aperture_size": 0.0, "lens_shift": (0.0, 0.0), "lens_tilt_angle": (0.0, 0.0), "shutter_type": "box",
     "screen_window_min": (-1.0, -1.0), "screen_window_max": (1.0, 1.0), "uv_remap": (0.0, 0.0, 0.0, 1.0),
 }  # fmt: skip
 """Arnold's parameters of lights and cameras that do nothing at these values."""
 
 
-def report_others(prim: Usd.Prim, known: set[str], code: float, report: Notebook) -> None:
-    """List what is authored on a prim besides its schema's properties and the `known` names."""
+def report_others(
+    prim: Usd.Prim,
+    known: set[str],
+    code: float,
+    report: Notebook,
+    said: Mapping[str, object],
+    unused: Set[str] = frozenset(),
+) -> None:
+    """List what is authored on a prim besides its schema's properties and the `known` names. `said` are values of
+    Arnold's parameters that say what the prim says anyhow, `unused` those of its parameters that do nothing here."""
     known = known | set(prim.GetPrimDefinition().GetPropertyNames())
-    lines: dict[tuple[str, bool], list[str]] = {}
+    lines: dict[str, list[str]] = {}
+    idle: list[str] = []
     for property_ in prim.GetAuthoredProperties():
         name = property_.GetName()
         if name in known or name.startswith(_NOT_OURS):
@@ -46,17 +57,20 @@ def report_others(prim: Usd.Prim, known: set[str], code: float, report: Notebook
         if len(words) == 1 and name.startswith("primvars:") and prim.HasAttribute("faceVertexCounts"):
             continue  # a mesh's own primvar
         value = property_.Get(code) if isinstance(property_, Usd.Attribute) else property_.GetTargets()
-        namespace = words[0] if len(words) > 1 else ""
-        lines.setdefault((namespace, _is_idle(words, value)), []).append(f"{name} = {_short(value)}")
-    for (namespace, idle), found in lines.items():
-        what = f"{namespace} attributes" if namespace else "attributes that USD does not know"
-        if idle:
-            report.note(prim.GetPath(), f"{what} without effect", f"they do not change the picture: {', '.join(found)}")
+        times = property_.GetTimeSamples() if isinstance(property_, Usd.Attribute) else ()
+        values = [value, *(property_.Get(time) for time in times)]
+        if all(_is_idle(words, v, said) for v in values) or (words[0] == "arnold" and words[-1] in unused):
+            idle.append(name)
         else:
-            report.warn(prim.GetPath(), what, f"they have no carrier: {', '.join(found)}")
+            lines.setdefault(words[0] if len(words) > 1 else "", []).append(f"{name} = {_short(value)}")
+    if idle:
+        report.idle(prim.GetPath(), idle)
+    for namespace, found in lines.items():
+        what = f"{namespace} attributes" if namespace else "attributes that USD does not know"
+        report.warn(prim.GetPath(), what, f"they have no carrier: {', '.join(found)}")
 
 
-def _is_idle(words: list[str], value) -> bool:
+def _is_idle(words: list[str], value, said: Mapping[str, object]) -> bool:
     """Whether an attribute does not change the picture."""
     if words[0] in _TOOLS or words[-1] in _SAMPLING or words[-1] in ("dcc_name", "maya_full_name"):
         return True
@@ -66,7 +80,21 @@ def _is_idle(words: list[str], value) -> bool:
         return True
     if words == ["arnold", "normalize"] and isinstance(value, bool):
         return True  # read elsewhere, but on a dome
-    return words[0] == "arnold" and len(words) == 2 and words[1] in _NEUTRAL and _same(value, _NEUTRAL[words[1]])
+    if words[0] != "arnold" or len(words) != 2:
+        return False
+    if words[1] == "portal_mode":
+        return value != "interior_only"  # else portals only guide sampling
+    if words[1] in said and _repeats(value, said[words[1]]):
+        return True
+    return words[1] in _NEUTRAL and _same(value, _NEUTRAL[words[1]])
+
+
+def _repeats(value, known) -> bool:
+    """Whether a value is a known one, up to the rounding of those who wrote it."""
+    wanted = np.atleast_1d(np.asarray(known, float))
+    width = wanted.shape[-1] if wanted.ndim == 2 else 1
+    rows = np.asarray(as_rows(value if hasattr(value, "__len__") else [value], width), float)
+    return rows.shape == wanted.shape and bool(np.allclose(rows, wanted, rtol=1e-5, atol=1e-6))
 
 
 def _same(value, neutral) -> bool:

@@ -60,6 +60,8 @@ class Gltf:
             self.json = json.loads(data)
             uri = self.json.get("buffers", [{}])[0].get("uri")
             self.buffer = (path.parent / uri).read_bytes() if uri else b""
+        self.held: set[tuple[int, str]] = set()
+        """Channels of nodes whose values are held from key to key."""
         self.nodes = self.json.get("nodes", [])
         self.parents = {c: i for i, n in enumerate(self.nodes) for c in n.get("children", [])}
         self.by_path = {n["extras"]["usdPath"]: i for i, n in enumerate(self.nodes) if "extras" in n}
@@ -140,13 +142,15 @@ class Gltf:
         return total
 
     def world(self, path: str, seconds: float | None = None) -> np.ndarray:
-        """World matrix, at the nearest animation key if a time is given."""
+        """World matrix, at the nearest animation key if a time is given (the last one where keys are held)."""
         index, matrix = self.by_path[path], np.eye(4)
         while index is not None:
             node = dict(self.nodes[index])
             if seconds is not None:
                 for key, (times, values) in self._channels(index).items():
-                    node[key] = values[np.abs(times - seconds).argmin()].tolist()
+                    held = max(np.searchsorted(times, np.float32(seconds), side="right") - 1, 0)
+                    near = held if (index, key) in self.held else np.abs(times - seconds).argmin()
+                    node[key] = values[near].tolist()
             matrix = local_matrix(node) @ matrix
             index = self.parents.get(index)
         return matrix
@@ -173,7 +177,10 @@ class Gltf:
             for channel in animation["channels"]:
                 if channel["target"]["node"] == node:
                     sampler = animation["samplers"][channel["sampler"]]
-                    assert sampler["interpolation"] == "LINEAR"
+                    if sampler["interpolation"] == "STEP":
+                        self.held.add((node, channel["target"]["path"]))
+                    else:
+                        assert sampler["interpolation"] == "LINEAR"
                     found[channel["target"]["path"]] = (
                         self.accessor(sampler["input"]),
                         self.accessor(sampler["output"]),

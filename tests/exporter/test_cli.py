@@ -187,11 +187,11 @@ def test_a_missing_payload_is_named_and_an_error_under_strict(export):
 
 
 LOSSES = {
-    "lights": 'def RectLight "K" { bool inputs:shadow:enable = 0 }',
+    "lights": 'def RectLight "K" { float inputs:shadow:distance = 3 }',
     "materials": 'def Material "M" {}\ndef Cube "C" (prepend apiSchemas = ["MaterialBindingAPI"]) { rel material:binding = </M> }',
     "geometry": 'def BasisCurves "C" {}',
     "cameras": 'def Camera "C" { float4[] clippingPlanes = [(0, 1, 0, 2)] }',
-    "animation": 'def Cube "C" { token visibility.timeSamples = { 1: "inherited", 2: "invisible" } }',
+    "animation": 'def Xform "C" { token visibility.timeSamples = { 1: "inherited", 2: "invisible" }\n def Cube "M" {}\n def Camera "C" {} }',
     "other": 'def Xform "Hall" (references = @gone/hall.usd@) {}',
 }
 
@@ -224,8 +224,9 @@ def test_strict_never_takes_the_word_after_it(export, tmp_path):
 
 
 @pytest.mark.parametrize("light", [True, False])
-def test_a_light_that_is_hidden_over_time_is_a_matter_of_lights(export, light):
-    inside = "def SphereLight \"L\" {}" if light else "def Cube \"C\" {}"
+def test_a_mesh_light_that_is_hidden_beside_a_camera_is_a_matter_of_lights(export, light):
+    inside = 'def Cube "C" (prepend apiSchemas = ["MeshLightAPI"]) {}' if light else 'def Cube "C" {}'
+    inside += '\ndef Camera "V" {}'
     result = export(f'def Xform "X" {{ token visibility.timeSamples = {{ 1: "inherited", 2: "invisible" }}\n {inside} }}')
     assert result.warned("lights" if light else "animation") == {"animated visibility"}
 

@@ -3,6 +3,7 @@
 import json
 
 import pytest
+from conftest import Gltf
 
 CUBES = """
 def Xform "Geo" {
@@ -274,6 +275,42 @@ def test_only_shapes_that_cast_shadows_are_geometry(gltf):
     rects = "".join(light(f"R{i}", shown.format(i), "RectLight") for i in (0, 1))
     scene = gltf(CUBES + rects + light("L", body))
     assert lit(scene, "/L", "/R0", "shadowLink") and not lit(scene, "/L", "/R1", "shadowLink")
+
+
+OFF = "bool inputs:shadow:enable = 0"
+
+
+@pytest.mark.parametrize("kind", ["RectLight", "DiskLight", "SphereLight", "CylinderLight", "DistantLight", "DomeLight"])
+@pytest.mark.parametrize("off", [OFF, "bool shadow:enable = 0", "bool primvars:arnold:cast_shadows = 0",
+                                 OFF + "\ncolor3f inputs:shadow:color = (1, 0, 0)\nfloat inputs:shadow:distance = 2"])  # fmt: skip
+def test_nothing_casts_shadows_of_a_light_whose_shadows_are_off(export, kind, off):
+    fog = 'def Volume "Fog" { custom float candelabra:fog:extinction = 0.5 }'
+    result = export(CUBES + light("L", off, kind) + light("M", "bool inputs:shadow:enable = 1") + light("N", OFF) + fog, "--strict")
+    assert result.code == 0, result.err
+    scene = Gltf(result.path)
+    places = [*(f"/Geo/{c}" for c in "abc"), "/Fog"]
+    assert not any(lit(scene, "/L", place, "shadowLink") for place in places)
+    assert all(lit(scene, "/L", place) and lit(scene, "/M", place, "shadowLink") for place in places)
+    # Both lights are of one set.
+    assert scene.lux("/L")["shadowLink"] == scene.lux("/N")["shadowLink"] == 0
+    assert "shadowLink" not in scene.lux("/M")
+
+
+def test_shadows_that_are_off_beside_links(gltf):
+    body = "\n".join([OFF, only("/Geo/a"), only("/Geo/b", link="shadowLink")])
+    mesh = f'def Cube "Lamp" (prepend apiSchemas = ["MeshLightAPI"]) {{ {OFF} }}\n'
+    scene = gltf(CUBES + light("L", body) + light("S", only("/Geo/b", link="shadowLink")) + mesh)
+    assert [lit(scene, "/L", f"/Geo/{c}") for c in "abc"] == [True, False, False]
+    assert [lit(scene, "/S", f"/Geo/{c}", "shadowLink") for c in "abc"] == [False, True, False]
+    for lamp in ("/L", "/Lamp"):
+        assert not any(lit(scene, lamp, place, "shadowLink") for place in ("/Geo/a", "/Geo/b", "/Geo/c", "/Lamp"))
+
+
+def test_shadows_over_time_are_those_of_the_first_frame(export):
+    times = "bool inputs:shadow:enable.timeSamples = { 1: 0, 2: 1 }"
+    result = export(CUBES + light("L", times), "--frames", "1-2")
+    assert not lit(Gltf(result.path), "/L", "/Geo/a", "shadowLink")
+    assert "animated inputs:shadow:enable" in result.warned("lights")
 
 
 def test_links_are_no_losses(export):

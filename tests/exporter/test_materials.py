@@ -264,13 +264,20 @@ def test_other_formats_become_png(gltf, tmp_path):
     assert pixels(scene, info)[0, 0].tolist() == [1, 2, 3, 255]
 
 
-def test_the_specular_workflow_is_approximated_and_reported(export):
+@pytest.mark.parametrize("ior", ["", "float inputs:ior = 1.5", "float inputs:ior = 1", "float inputs:ior = 2.4", "float inputs:ior = 0"])
+@pytest.mark.parametrize("color", [(0.04, 0.08, 0.04), (0, 0, 0), (1, 0.5, 1e-4), (0.9, 0.9, 0.9)])
+def test_in_the_specular_workflow_the_specular_colour_is_what_is_reflected_straight_on(export, ior, color):
+    """Whatever the index of refraction and the metalness; at grazing angles everything is."""
     from conftest import Gltf
 
-    result = export(surface("int inputs:useSpecularWorkflow = 1\n color3f inputs:specularColor = (0.04, 0.08, 0.04)"))
-    specular = Gltf(result.path).material("/M")["extensions"]["KHR_materials_specular"]
-    assert specular["specularColorFactor"] == pytest.approx([1, 2, 1])
-    assert "specular workflow" in result.warned()
+    inputs = f"int inputs:useSpecularWorkflow = 1\n color3f inputs:specularColor = {color}\n float inputs:metallic = 1\n {ior}"
+    result = export(surface(inputs), "--strict")
+    assert result.code == 0, result.err
+    material = Gltf(result.path).material("/M")
+    index = material["extensions"].get("KHR_materials_ior", {}).get("ior", 1.5)
+    specular = material["extensions"]["KHR_materials_specular"]
+    assert ((index - 1) / (index + 1)) ** 2 * np.array(specular["specularColorFactor"]) == pytest.approx(color, rel=1e-5, abs=1e-9)
+    assert specular["specularFactor"] == 1 and material["pbrMetallicRoughness"]["metallicFactor"] == 0
 
 
 @pytest.mark.parametrize("name", ["PxrSurface", "ND_surface", "ND_gone_surfaceshader", "arnold:standard_hair", ""])
