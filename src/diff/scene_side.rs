@@ -44,7 +44,7 @@ impl<'a> SceneSide<'a> {
         let tree = beside.as_ref().map(|(_, tree)| tree);
         let emitters = pipeline::collect_emitters(scene, tree, &|_, _| {});
         let mut survey = pipeline::survey(scene, &emitters, &frames)
-            .map_err(|cause| SideError::Overflow { path: scene.source.clone(), cause })?;
+            .map_err(|cause| SideError::Survey { path: scene.source.clone(), cause })?;
         if let Some((path, tree)) = &beside {
             pipeline::check_agreement(tree, path, scene, &survey, &[], true)?;
         }

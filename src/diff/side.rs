@@ -4,10 +4,9 @@ use super::SideName;
 use super::light::Light;
 use super::scene_side::SceneSide;
 use super::tree_side::TreeSide;
-use crate::emitter::LightOverflow;
 use crate::ingest::IngestError;
 use crate::light_tree::LightTree;
-use crate::pipeline::{self, LearnedError, OpenedTree, TreeError, ViewError};
+use crate::pipeline::{self, LearnedError, OpenedTree, SurveyError, TreeError, ViewError};
 use crate::scene::{Camera, Scene};
 use crate::store::AlignedBytes;
 use glam::DVec3;
@@ -41,13 +40,13 @@ pub enum SideError {
     /// There is no camera to look through.
     #[error(transparent)]
     View(#[from] ViewError),
-    /// A scene has a light that no tree can hold.
+    /// A scene has lights that no tree can hold.
     #[error("{}: {cause}", path.display())]
-    Overflow {
+    Survey {
         /// The scene's file.
         path: PathBuf,
-        /// Which light.
-        cause: LightOverflow,
+        /// Which, and why.
+        cause: SurveyError,
     },
     /// A folder cannot be walked.
     #[error(transparent)]

@@ -9,10 +9,10 @@ use super::build::{Rebuilt, build_tree, rebuild_tree};
 use super::fresh::{OpenedTree, TreeError, build_options, check_output, open_base};
 use super::read::read_scene;
 use super::{
-    Event, ReadError, ShotTrees, StageOptions, Strict, Survey, TreeChoice, Watch, collect_emitters,
-    frames_of, survey, with_trees,
+    Event, ReadError, ShotTrees, StageOptions, Strict, Survey, SurveyError, TreeChoice, Watch,
+    collect_emitters, frames_of, survey, with_trees,
 };
-use crate::emitter::{Emitters, LightOverflow};
+use crate::emitter::Emitters;
 use crate::light_tree::LightTree;
 use crate::render::frames::Frames;
 use crate::scene::Scene;
@@ -116,13 +116,13 @@ pub enum BuildError {
     /// There is no scene to build for.
     #[error(transparent)]
     Read(#[from] ReadError),
-    /// It has a light that no tree can hold.
+    /// It has lights that no tree can hold.
     #[error("{}: {cause}", scene.display())]
-    Overflow {
+    Survey {
         /// The scene's file.
         scene: PathBuf,
-        /// The light.
-        cause: LightOverflow,
+        /// Which, and why.
+        cause: SurveyError,
     },
     /// The output is a file that the scene was read from.
     #[error("{}: is the scene's own file; choose another output", output.display())]
@@ -301,7 +301,7 @@ impl BuildJob {
             None => frames_of(&lit.scene),
         };
         survey(&lit.scene, &lit.emitters, &frames)
-            .map_err(|cause| BuildError::Overflow { scene: self.scene.clone(), cause })
+            .map_err(|cause| BuildError::Survey { scene: self.scene.clone(), cause })
     }
 
     /// Does what a process does before its first frame: without the file, and with it.

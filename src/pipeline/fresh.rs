@@ -3,7 +3,7 @@
 use super::agreement::{Contradiction, find_contradiction};
 use super::build::algorithm_of;
 use super::frames::spell;
-use super::{StageOptions, Survey, frames_of, survey};
+use super::{StageOptions, Survey, SurveyError, frames_of, survey};
 use crate::emitter::{Emitters, LightOverflow};
 use crate::light_tree::{ALGORITHM_VERSION, LightSummary, LightTree, NoSuchFrame, SameLinks};
 use crate::scene::Scene;
@@ -85,9 +85,15 @@ pub enum TreeError {
         /// The file.
         path: PathBuf,
     },
-    /// The scene has a light that no tree can hold.
+    /// The scene has lights that no tree can hold.
     #[error(transparent)]
-    Overflow(#[from] LightOverflow),
+    Survey(#[from] SurveyError),
+}
+
+impl From<LightOverflow> for TreeError {
+    fn from(overflow: LightOverflow) -> TreeError {
+        TreeError::Survey(overflow.into())
+    }
 }
 
 /// Whether a path is that of a tree file, by its extension.
@@ -235,7 +241,7 @@ pub fn check_agreement<D: AsRef<[u8]> + Sync>(
 /// lights that have changed takes a survey of all frames.
 ///
 /// # Errors
-/// [`TreeError::Overflow`] if the scene has a light that no tree can hold.
+/// [`TreeError::Survey`] if the scene has lights that no tree can hold.
 pub(super) fn stale<D: AsRef<[u8]>>(
     tree: &LightTree<D>,
     path: &Path,

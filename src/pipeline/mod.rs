@@ -70,7 +70,7 @@ pub use shot_trees::{ShotTrees, TreeChoice, TreeFile, with_trees};
 pub use stage::{StageError, StageOptions};
 pub use stamp::{PreviewStamp, Stamp, Stamper};
 pub use strict::{Strict, StrictError};
-pub use survey::{Group, PlacedLight, SharedBounds, Survey, SurveyedFrame, survey};
+pub use survey::{Group, PlacedLight, SharedBounds, Survey, SurveyError, SurveyedFrame, survey};
 pub use textures::collect_emitters;
 pub use view::{ASPECT, Look, View, ViewError, look};
 pub use view_keys::view_keys;

@@ -48,7 +48,7 @@ impl<'a> ShotTrees<'a> {
     ///
     /// # Errors
     /// [`TreeError::Stale`] if what stands still has changed since; [`TreeError::Contradicts`] if the file
-    /// numbers emitters otherwise; [`TreeError::Overflow`] if the scene has a light that no tree can hold.
+    /// numbers emitters otherwise; [`TreeError::Survey`] if the scene has lights that no tree can hold.
     pub fn of_file(
         scene: &'a Scene,
         emitters: &'a Emitters,
@@ -63,7 +63,7 @@ impl<'a> ShotTrees<'a> {
     /// Builds trees. Surveys what stands still.
     ///
     /// # Errors
-    /// [`TreeError::Overflow`] if the scene has a light that no tree can hold.
+    /// [`TreeError::Survey`] if the scene has lights that no tree can hold.
     pub fn built(scene: &'a Scene, emitters: &'a Emitters) -> Result<ShotTrees<'a>, TreeError> {
         let surveyor = Surveyor::new(scene, emitters)?;
         Ok(ShotTrees { surveyor, source: Source::Built(BuiltTrees::over(emitters)) })
@@ -74,7 +74,7 @@ impl<'a> ShotTrees<'a> {
     /// # Errors
     /// [`TreeError::NoSuchFrame`] if a file was built without the frame; [`TreeError::Stale`],
     /// [`TreeError::Broken`] or [`TreeError::Contradicts`] if what it has of the frame is not what the scene
-    /// gives; [`TreeError::Overflow`] if the frame has a light that no tree can hold.
+    /// gives; [`TreeError::Survey`] if the frame has lights that no tree can hold.
     pub fn for_frame(&mut self, frame: i32) -> Result<LightTree<&[u8]>, TreeError> {
         match &mut self.source {
             Source::File(file) => file.checked(&mut self.surveyor, frame),

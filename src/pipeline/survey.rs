@@ -88,20 +88,56 @@ pub struct PlacedLight {
     pub light: u32,
 }
 
+/// What no tree can hold.
+#[derive(Clone, Debug, thiserror::Error, PartialEq, Eq)]
+pub enum SurveyError {
+    /// A light that is too far away or too strong for `f32`.
+    #[error(transparent)]
+    Overflow(#[from] LightOverflow),
+    /// Lights that change, in so many frames.
+    #[error(
+        "lights that change have more than {most} emitters in all, by frame {frame}; build fewer frames at a time (--frames)"
+    )]
+    TooMany {
+        /// The most that a build takes: about 100 bytes of memory each.
+        most: usize,
+        /// The frame that is one too many.
+        frame: i32,
+    },
+}
+
+/// The most emitters that change, summed over frames that are unlike.
+const MOST_CHANGING: usize = 1 << 27;
+
 /// Surveys a scene for some frames (ascending). If no light changes the frames do not matter.
 ///
 /// # Errors
-/// A light that is too far away or too strong for `f32`.
-pub fn survey(scene: &Scene, emitters: &Emitters, frames: &[i32]) -> Result<Survey, LightOverflow> {
+/// A light that no tree can hold, or too many that change in too many frames.
+pub fn survey(scene: &Scene, emitters: &Emitters, frames: &[i32]) -> Result<Survey, SurveyError> {
+    survey_within(scene, emitters, frames, MOST_CHANGING)
+}
+
+fn survey_within(
+    scene: &Scene,
+    emitters: &Emitters,
+    frames: &[i32],
+    most: usize,
+) -> Result<Survey, SurveyError> {
     let mut surveyor = Surveyor::new(scene, emitters)?;
     let frames = if surveyor.is_changing() { frames } else { &[] };
     let mut surveyed: Vec<SurveyedFrame> = Vec::with_capacity(frames.len());
-    let mut seen = HashMap::new();
+    let (mut seen, mut changing) = (HashMap::new(), 0);
     for &number in frames {
         let own = surveyor.shared.len();
         let mut frame = surveyor.frame(number)?;
         match seen.entry(frame.fingerprint) {
-            Entry::Vacant(place) => drop(place.insert(surveyed.len())),
+            Entry::Vacant(place) => {
+                changing += frame.group.flat.len();
+                if changing > most {
+                    return Err(SurveyError::TooMany { most, frame: number });
+                }
+                place.insert(surveyed.len());
+            }
             Entry::Occupied(alike) => {
                 frame.group = surveyed[*alike.get()].group.clone();
                 surveyor.shared.truncate(own);
@@ -203,5 +239,48 @@ impl Survey {
             false => add(&self.still),
         }
         *hasher.finalize().as_bytes()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::color::Rgb;
+    use crate::scene::{Interpolation, Keys, Light, LightKind, Node, Trs, Visibility};
+
+    /// One lamp that gets brighter until the third second, at one frame a second.
+    fn dimmer() -> Scene {
+        let values = Keys {
+            times_s: vec![0.0, 3.0],
+            values: vec![Rgb::ONE, 4.0 * Rgb::ONE],
+            interpolation: Interpolation::Linear,
+        };
+        let mut scene = Scene {
+            nodes: vec![Node::fixed("/lamp", None, Trs::default())],
+            lights: vec![Light {
+                node: 0,
+                kind: LightKind::Point { intensity_cd: Rgb::ONE },
+                values: Some(values),
+                range_m: None,
+                forced: false,
+                visibility: Visibility::default(),
+            }],
+            ..Scene::default()
+        };
+        (scene.timeline.zero_frame, scene.timeline.frames_per_second) = (0.0, 1.0);
+        scene
+    }
+
+    /// Frames that are alike count once: they share their lights.
+    #[test]
+    fn too_many_lights_that_change_are_refused_by_frame() {
+        let scene = dimmer();
+        let emitters = Emitters::collect(&scene);
+        let within =
+            |frames: &[i32], most| survey_within(&scene, &emitters, frames, most).map(drop);
+        assert_eq!(within(&[0, 1, 2, 3, 4, 5, 6], 4), Ok(()));
+        let refused = Err(SurveyError::TooMany { most: 3, frame: 3 });
+        assert_eq!(within(&[0, 1, 2, 3, 4, 5, 6], 3), refused);
+        assert_eq!(within(&[3, 4, 5, 6], 1), Ok(()));
     }
 }

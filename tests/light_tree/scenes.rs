@@ -5,7 +5,7 @@ use crate::support::dead_probability_in;
 use candelabra::emitter::{Emitters, infinite_lights};
 use candelabra::light_tree::{LightTree, Receiver};
 use candelabra::math::random::hash;
-use candelabra::pipeline;
+use candelabra::pipeline::{self, SurveyError};
 use candelabra::scene::{Light, LightKind, Node, Scene, Trs};
 use glam::{DMat3, DQuat, DVec3, Vec2, Vec3};
 use std::path::PathBuf;
@@ -133,7 +133,10 @@ fn what_is_beyond_numbers_is_refused_by_name() {
     let here = at(DVec3::ZERO, DQuat::IDENTITY);
     let refused = |scene: &Scene| {
         let emitters = Emitters::collect(scene);
-        pipeline::survey(scene, &emitters, &[]).err().map(|overflow| overflow.path)
+        pipeline::survey(scene, &emitters, &[]).err().map(|error| match error {
+            SurveyError::Overflow(overflow) => overflow.path,
+            SurveyError::TooMany { .. } => panic!("{error}"),
+        })
     };
     assert_eq!(refused(&scene_with(&[(point(1e38), here)])), None);
     for broken in [
