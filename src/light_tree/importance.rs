@@ -150,8 +150,10 @@ impl Cluster {
         // Of beams narrower than a hemisphere, fewer reach any one point.
         let beam = (2.0 * (1.0 - self.cos_theta_e) / (1.0 - cos_o).max(1e-9)).clamp(1e-9, 1.0);
         let of_cone = ((front + back) * beam, (front2 + back2) * beam);
-        // The mean square is that of faces and of spheres, and between them a line.
-        let of_all = (self.share, (self.share * (10.0 / 9.0) - 1.0 / 9.0).max(self.share * FACES));
+        // Faces have a mean square of 1/6, or 1/3 if they emit from both sides, spheres 1; between them it is a line.
+        let (of_faces, square) = if self.two_sided { (0.5, 1.0 / 3.0) } else { (0.25, 1.0 / 6.0) };
+        let square = 1.0 - (1.0 - self.share) * ((1.0 - square) / (1.0 - of_faces));
+        let of_all = (self.share, square.max(self.share * FACES));
         let moments = if self.is_round() { of_all } else { of_cone };
         (moments.0.max(LEAST_EXPECTED * emission), deviation(moments))
     }

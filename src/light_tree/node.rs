@@ -91,7 +91,8 @@ impl Node {
         let theta_o = (sin_half(bounds.cone.theta_o + tilt) * THETA_O_STEPS).ceil();
         let theta_o = theta_o.min(THETA_O_STEPS);
         let theta_e = if theta_o == THETA_O_STEPS {
-            (f64::from(bounds.share).sqrt() * THETA_E_STEPS).round()
+            // Never 0: very narrow beams are not certain.
+            (f64::from(bounds.share).sqrt() * THETA_E_STEPS).round().max(1.0)
         } else {
             (2f64.sqrt() * sin_half(bounds.cone.theta_e) * THETA_E_STEPS).ceil()
         };
@@ -126,7 +127,7 @@ impl Node {
             aabb: Aabb { min: round_down(center - half), max: -round_down(-center - half) },
             cone,
             energy: self.energy,
-            // Spheres make a cluster round, so these are faces and spots, each with a cone of its own.
+            // Spheres make a cluster round, so these are faces and spots. It is that of the widest.
             share: if is_round {
                 decode_share(self.theta_e)
             } else {

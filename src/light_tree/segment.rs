@@ -118,7 +118,9 @@ impl Viewer for Segment {
         Factors {
             product: if is_dark { 0.0 } else { product },
             decay: line as f32,
-            spread: spread_of_distance(r2 as f32, passage.nearest2 as f32) + cluster.missed(cos_o),
+            spread: (spread_of_distance(r2 as f32, passage.nearest2 as f32)
+                + cluster.missed(cos_o))
+            .max(0.0),
             sight: Sight::default(),
         }
     }

@@ -44,6 +44,11 @@ fn texture_mean(posed: &PosedEmitters, row: usize) -> Rgb {
         let [a, b, c] = corners.map(|corner| positions[corner as usize].as_dvec3());
         sum + light.texture_mean(own).as_dvec3() * (b - a).cross(c - a).length()
     });
+    if sum == glam::DVec3::ZERO {
+        // Without area, as a light may be that deforms: then all triangles count alike.
+        let sum = (0..light.count).map(|own| light.texture_mean(own)).sum::<Rgb>();
+        return sum / sum.max_element().max(f32::MIN_POSITIVE);
+    }
     // `LightLook` wants a hue, whatever its strength; but numbers must stay in range.
     (sum / sum.max_element().max(f64::MIN_POSITIVE)).as_vec3()
 }

@@ -132,7 +132,8 @@ fn survey_within(
         let mut frame = surveyor.frame(number)?;
         match seen.entry(frame.fingerprint) {
             Entry::Vacant(place) => {
-                changing += frame.group.flat.len();
+                let of_forced = surveyor.shared[own..].iter().map(|light| light.bounds.len());
+                changing += frame.group.flat.len() + of_forced.sum::<usize>();
                 if changing > most {
                     return Err(SurveyError::TooMany { most, frame: number });
                 }
@@ -282,5 +283,16 @@ mod tests {
         let refused = Err(SurveyError::TooMany { most: 3, frame: 3 });
         assert_eq!(within(&[0, 1, 2, 3, 4, 5, 6], 3), refused);
         assert_eq!(within(&[3, 4, 5, 6], 1), Ok(()));
+    }
+
+    /// A forced light has a tree of its own in each frame that is unlike.
+    #[test]
+    fn forced_lights_count_too() {
+        let mut scene = dimmer();
+        scene.lights[0].forced = true;
+        let emitters = Emitters::collect(&scene);
+        let within = |most| survey_within(&scene, &emitters, &[0, 1, 2, 3], most).map(drop);
+        assert_eq!(within(4), Ok(()));
+        assert_eq!(within(1), Err(SurveyError::TooMany { most: 1, frame: 1 }));
     }
 }

@@ -32,6 +32,8 @@ struct ReportedNode {
     axis: [f64; 3],
     theta_o: f64,
     theta_e: f64,
+    #[serde(default)]
+    share: f64,
     two_sided: bool,
     energy: f64,
     /// `None` if it is without end.
@@ -67,6 +69,7 @@ pub fn report<D: AsRef<[u8]>>(tree: &LightTree<D>) -> Report {
             axis: bounds.cone.axis.as_dvec3().to_array(),
             theta_o: bounds.cone.theta_o.into(),
             theta_e: bounds.cone.theta_e.into(),
+            share: bounds.share.into(),
             two_sided: bounds.cone.two_sided,
             energy: node.energy().into(),
             range: Some(f64::from(bounds.range_m)).filter(|range| range.is_finite()),

@@ -166,7 +166,10 @@ proptest! {
         places in prop::collection::vec((-1f32..1.0, -1f32..1.0, -1f32..1.0, -6f32..6.0), 1..200),
         links in prop::collection::vec(0u32..9, 200), lit in any::<u64>()
     ) {
-        let point = |&(x, y, z, exponent): &(f32, f32, f32, f32)| LightBounds::of_emitter(Aabb::around([Vec3::new(x, y, z)]), Cone::ALL, 10f32.powf(exponent), f32::INFINITY);
+        let point = |&(x, y, z, exponent): &(f32, f32, f32, f32)| {
+            let at = Aabb::around([Vec3::new(x, y, z)]);
+            LightBounds::of_emitter(at, Cone::ALL, 10f32.powf(exponent), f32::INFINITY)
+        };
         let bounds: Vec<_> = places.iter().map(point).collect();
         let links = numbered(links.into_iter().take(bounds.len()));
         let tree = linked_tree(&bounds, &links);
