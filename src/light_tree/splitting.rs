@@ -37,9 +37,9 @@ pub enum SplitTest {
 }
 
 /// At knob 0.5, a cluster is opened if its part in the relative variance is above this.
-const OPENED_ABOVE: f64 = 0.007;
+const OPENED_ABOVE: f64 = 0.04;
 /// At knob 0.5, so much relative variance is worth one more sample.
-const WORTH_A_SAMPLE: f64 = 0.013;
+const WORTH_A_SAMPLE: f64 = 0.08;
 /// At knob 0.5, the seed's rule splits a cluster whose measure is above this.
 const GLARE: f64 = 2.0;
 

@@ -19,8 +19,9 @@ const MEAN_OFF: f64 = 0.005;
 const RMS_SIGMAS: f64 = 1.3;
 const MOST_SIGMAS: f64 = 8.0;
 const BLOCK: u32 = 8;
-/// What the reference itself may be off in a block, relative: its noise, and its ray epsilons.
-const OFF_OF_REFERENCE: f64 = 2e-3;
+/// What the reference itself may be off in a block, relative: its noise, and its ray epsilons. Of three pictures of the
+/// ribbon with seeds of their own, blocks are off together by 2.8e-3.
+const OFF_OF_REFERENCE: f64 = 2.8e-3;
 
 /// Luminance, row after row.
 fn read(path: &Path) -> (u32, u32, Vec<f64>) {
