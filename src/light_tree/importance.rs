@@ -6,8 +6,8 @@
 //!
 //! - The paper's cosines are the largest that any emitter of the cluster can have. They decide what is
 //!   dark, and weigh what lights a stretch of a ray. Otherwise a cluster is weighed by the cosines that
-//!   are [expected](clipped_mean) of emitters spread over the box and of normals spread over the cone: most of a wide
-//!   cone faces away, whatever its edge does.
+//!   are [expected](clipped_moments) of emitters spread over the box and of normals spread over the cone: most of a wide
+//!   cone faces away, whatever its edge does. Where normals point everywhere, a node tells the mean itself.
 //! - The distance is `d^2 + r^2/10` with `r` the sphere's radius: no kink and no pole where the
 //!   receiver is inside, and in units of length squared, so that the scale of the scene cancels.
 //! - Importance 0 means that no light can arrive, so it is returned only beyond a [slack](EDGE_SLACK)
