@@ -249,7 +249,7 @@ def test_without_seconds_nothing_moves_and_it_is_told(export, per_second):
     mesh = cube(at("point3f[] points", CORNERS), at("vector3f[] velocities", TURNS))
     placed = instancer(at("point3f[] positions", PLACES), at("vector3f[] velocities", SPEEDS), "float3[] scales = [(1, 2, 3), (1, 1, 1), (2, 2, 2)]\n",
                        "quath[] orientations = [(1, 0, 0, 0), (0.6, 0.8, 0, 0), (1, 0, 0, 0)]\n")  # fmt: skip
-    result = export(shot(START + 1, per_second) + mesh + placed)
+    result = export(shot(START + 1, per_second) + mesh + "\n" + placed)
     assert result.code == 0
     assert {"velocities without effect", "timeCodesPerSecond is not positive"} <= result.warned("animation")
     scene = Gltf(result.path)
