@@ -5,13 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from pxr import Usd, UsdGeom
+from pxr import Gf, Usd, UsdGeom
 
 from .primvars import as_rows
 from .report import Notebook
 from .stage import Frames
 from .transforms import column
-from .velocities import instances_move
+from .velocities import has_seconds, instances_move
 
 
 @dataclass
@@ -67,11 +67,27 @@ def _state(instancer: UsdGeom.PointInstancer, code: float) -> tuple[np.ndarray, 
     """Matrices, prototype indices and visibility of all instances at a time code."""
     time = Usd.TimeCode(code)
     kind = UsdGeom.PointInstancer
-    matrices = instancer.ComputeInstanceTransformsAtTime(
-        time, time, kind.ExcludeProtoXform, kind.IgnoreMask
-    )
+    if has_seconds(instancer.GetPrim().GetStage()):
+        matrices = instancer.ComputeInstanceTransformsAtTime(time, time, kind.ExcludeProtoXform, kind.IgnoreMask)
+    else:
+        matrices = _without_velocities(instancer, time)
     prototypes = as_rows(instancer.GetProtoIndicesAttr().Get(time), 1, int)
     mask = instancer.ComputeMaskAtTime(time)
     shown = np.array(mask, dtype=bool) if len(mask) == len(prototypes) else np.ones(len(prototypes), bool)
     stack = column(np.array(matrices, dtype=float).reshape(-1, 4, 4))
     return stack, prototypes, shown
+
+
+def _without_velocities(instancer: UsdGeom.PointInstancer, time: Usd.TimeCode) -> list[Gf.Matrix4d]:
+    """The matrices of instances whose velocities say nothing; none for arrays of different lengths."""
+    positions = as_rows(instancer.GetPositionsAttr().Get(time), 3)
+    sizes = as_rows(instancer.GetScalesAttr().Get(time), 3)
+    turns = instancer.GetOrientationsfAttr().Get(time) or instancer.GetOrientationsAttr().Get(time) or ()
+    if any(len(given) not in (0, len(positions)) for given in (sizes, turns)):
+        return []
+    found = []
+    for number, position in enumerate(positions):
+        size = Gf.Matrix4d().SetScale(Gf.Vec3d(*sizes[number])) if len(sizes) else Gf.Matrix4d(1)
+        turn = Gf.Matrix4d().SetRotate(Gf.Quatd(turns[number])) if len(turns) else Gf.Matrix4d(1)
+        found.append(size * turn * Gf.Matrix4d().SetTranslate(Gf.Vec3d(*position)))
+    return found

@@ -54,6 +54,7 @@ class LightCarriers:
         self.square_metres = meters_per_unit**2
         self.normalize_unit = 1.0 if normalize_area == "stage" else self.square_metres
         self._tessellations: dict[tuple, dict] = {}
+        self._posed: dict[tuple[int, bytes], tuple[MeshSource, np.ndarray]] = {}
 
     def carry(self, light: Light, node: dict, world: np.ndarray, mesh: MeshSource | None) -> None:
         """Make `node`, which stands at `world` (stage units; one matrix or one a frame), this light."""
@@ -200,9 +201,22 @@ class LightCarriers:
         node["mesh"] = self.document.shared("meshes", body)
 
     def _areas(self, world: np.ndarray, mesh: MeshSource) -> np.ndarray:
-        """The area of a mesh that deforms, at each frame."""
-        matrices = np.broadcast_to(world, (len(self.frames.codes), 4, 4))
-        return np.array([mesh.area(matrix[:3, :3], code) for matrix, code in zip(matrices, self.frames.codes, strict=True)])
+        """The area of a mesh that deforms, at each frame; it is posed once for all instances of even scale."""
+        linear = world[..., :3, :3]
+        gram = np.swapaxes(linear, -1, -2) @ linear
+        even = np.trace(gram, axis1=-2, axis2=-1) / 3
+        if (np.abs(gram - even[..., None, None] * np.eye(3)).max(axis=(-2, -1)) <= 1e-9 * even).all():
+            return even * self._areas_under(np.eye(3), mesh)
+        if world.ndim == 2:
+            return self._areas_under(linear, mesh)
+        return np.array([mesh.area(*at) for at in zip(linear, self.frames.codes, strict=True)])
+
+    def _areas_under(self, linear: np.ndarray, mesh: MeshSource) -> np.ndarray:
+        """The same under one linear map."""
+        key = (id(mesh), linear.tobytes())
+        if key not in self._posed:
+            self._posed[key] = mesh, np.array([mesh.area(linear, code) for code in self.frames.codes])
+        return self._posed[key][1]
 
     # -- lights without area ---------------------------------------------------------------------
 

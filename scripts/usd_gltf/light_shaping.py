@@ -52,7 +52,7 @@ def read_shapings(inputs: LightAttributes, kind: str) -> list[Shaping]:
     frames = inputs.frames
     names = _INPUTS if kind in _SHAPED else ("angle",) if kind == "DistantLight" else ()
     codes = frames.codes if any(changes(inputs.attribute(name), frames) for name in names) else (frames.first,)
-    found: dict[tuple, Shaping] = {}
+    found: dict[tuple, tuple[int, Shaping]] = {}
     rows = []
     for code in codes:
         shaping = _read(inputs, kind, code)
@@ -60,11 +60,10 @@ def read_shapings(inputs: LightAttributes, kind: str) -> list[Shaping]:
         asset = None if profile is None else (inputs.at("shaping:ies:file", code), profile.angle_scale, profile.normalize)
         cone = None if shaping.cone is None else tuple((name, str(value)) for name, value in shaping.cone.items())
         key = (cone, str(asset), shaping.angle_deg)
-        rows.append(list(found).index(key) if key in found else len(found))
-        found.setdefault(key, shaping)
+        rows.append(found.setdefault(key, (len(found), shaping))[0])
     for name in _INPUTS[: 4 if inputs.asset("shaping:ies:file") is None else None] if kind not in _SHAPED else ():
         inputs.still(name)
-    shapings = list(found.values())
+    shapings = [shaping for _, shaping in found.values()]
     if len(shapings) > MOST:
         why = f"it has {len(shapings)} shapings, more than {MOST}; the first frame's is used"
         inputs.report.warn(inputs.path, "animated shaping", why)

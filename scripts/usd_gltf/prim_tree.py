@@ -98,7 +98,7 @@ class PrimTree:
         self.stage, self.meshes, self.frames, self.progress = stage, meshes, frames, progress
         self.purposes, self.meters_per_unit, self.networks, self.report = purposes, meters_per_unit, networks, report
         self.lights = report.about("lights")
-        self._prototypes: dict[str, Prim | None] = {}
+        self._prototypes: dict[tuple, Prim | None] = {}
         self._open: set[str] = set()
         self._lights: dict[tuple[str, str], Light] = {}
         self._dark: dict[tuple[str, bytes], Light] = {}
@@ -137,10 +137,9 @@ class PrimTree:
             imageable = UsdGeom.Imageable(prim)
             if changes(imageable.GetVisibilityAttr(), self.frames):
                 seen, own = self._seen(prim, imageable, above)
-                if not seen.at.any():
-                    self.report.count("invisible prims")
-                    return None
             elif imageable.GetVisibilityAttr().Get(self.frames.first) == UsdGeom.Tokens.invisible:
+                seen = replace(above, at=np.zeros(len(self.frames.codes), bool), is_left_out=True)
+            if seen.at is not None and not seen.at.any() and not holds_camera(prim):
                 self.report.count("invisible prims")
                 return None
             purpose = imageable.ComputePurposeInfo(purpose) if purpose else imageable.ComputePurposeInfo()
@@ -152,17 +151,17 @@ class PrimTree:
                 self.report.warn(path, "transform that is not finite", "the prim and all below it are left out")
                 return None
         if prim.IsA(UsdGeom.PointInstancer):
-            if shown and not seen.is_left_out:
-                self._instances(prim, compiled)
+            if shown:
+                self._instances(prim, compiled, seen)
         else:
-            if shown and (not seen.is_left_out or is_darkened(prim)):
+            if shown and (not seen.is_left_out or is_darkened(prim) or prim.IsA(UsdGeom.Camera)):
                 self._content(prim, compiled, seen)
             for child in prim.GetFilteredChildren(predicate):
                 below = self._compile(child, purpose, predicate, seen)
                 if below is not None:
                     compiled.children.append(below)
         if compiled.camera is not None or compiled.light is not None:
-            placed = placement(prim, self.frames.first, self.report.about("cameras") if compiled.camera else self.lights)
+            placed = placement(prim, self.frames, self.report.about("cameras") if compiled.camera else self.lights)
             if placed is not None:
                 _insert(compiled, placed)
         if compiled.light is not None and compiled.light.pole_z:
@@ -190,6 +189,8 @@ class PrimTree:
         """How a prim whose visibility changes is seen, and when a node around it is to be; None if there is to be none."""
         own = seen_over_time(imageable, self.frames)
         at = own if above.at is None else above.at & own
+        if not at.any():
+            return replace(above, at=at, is_left_out=True), None
         if not is_drawn(prim):
             return replace(above, at=at), None
         if holds_camera(prim):
@@ -262,8 +263,8 @@ class PrimTree:
             self._dark[key] = dark_while_hidden(light, seen)
         return self._dark[key] if seen.any() else None
 
-    def _instances(self, prim: Usd.Prim, compiled: Prim) -> None:
-        """The prototypes of a PointInstancer and where they are put."""
+    def _instances(self, prim: Usd.Prim, compiled: Prim, seen: Seen) -> None:
+        """The prototypes of a PointInstancer, which is `seen` so, and where they are put."""
         path = str(prim.GetPath())
         targets = UsdGeom.PointInstancer(prim).GetPrototypesRel().GetForwardedTargets()
         for number, placements in read_placements(prim, self.frames, self.report).items():
@@ -271,26 +272,28 @@ class PrimTree:
                 why = f"protoIndices name {number}, but there are {len(targets)} prototypes; they are left out"
                 self.report.warn(path, "instances without a prototype", why)
                 continue
-            prototype = self._prototype(str(targets[number]), path)
+            prototype = self._prototype(str(targets[number]), path, seen)
             if prototype is not None:
                 compiled.instances.append((prototype, placements))
                 self.report.count("instances", len(placements.numbers))
 
-    def _prototype(self, target: str, instancer: str) -> Prim | None:
-        """A prototype compiled once, by itself: what is above it does not hide it."""
+    def _prototype(self, target: str, instancer: str, seen: Seen) -> Prim | None:
+        """A prototype compiled once for all instancers that are `seen` alike. What hides them hides it, not what
+        is above it."""
+        key = (target, *(None if mask is None else mask.tobytes() for mask in (seen.at, seen.drawn)), seen.is_left_out)
         if target in self._open:
             self.report.warn(instancer, "PointInstancer inside its own prototype", f"{target} is left out there")
             return None
-        if target not in self._prototypes:
+        if key not in self._prototypes:
             prim = self.stage.GetPrimAtPath(target)
             if not prim:
                 why = f"there is no prim {target}; its instances are left out"
                 self.report.warn(instancer, "missing prototype", why)
                 return None
             self._open.add(target)
-            self._prototypes[target] = self._compile(prim, None, PROTOTYPE_PREDICATE)
+            self._prototypes[key] = self._compile(prim, None, PROTOTYPE_PREDICATE, seen)
             self._open.discard(target)
-        return self._prototypes[target]
+        return self._prototypes[key]
 
 
 def _over_time(xformable: UsdGeom.Xformable, frames: Frames) -> np.ndarray:

@@ -3,7 +3,8 @@
 What is drawn vanishes with a node around it, whose size is 1 while it is seen and 0 while it is hidden; keys are held, as
 visibility is. A light without a mesh is dark while it is hidden, for size does not matter to all of them: a light whose shape
 casts no shadows is not there at all while it is unlit (`src/ingest/carriers.md`). A camera has no use for a size
-of 0: of a prim with a camera below it the first frame's visibility counts.
+of 0: of what is drawn beside a camera, below a prim that hides both, the first frame's visibility counts. A camera itself
+is not drawn, and never left out for visibility.
 """
 
 from __future__ import annotations

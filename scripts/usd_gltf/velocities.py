@@ -12,6 +12,8 @@ those of what they move, and as many as that.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from pxr import Usd, UsdGeom
 
@@ -67,10 +69,17 @@ def _fault(values: Usd.Attribute, velocities: Usd.Attribute, accelerations: Usd.
     given = as_rows(velocities.Get(at), 3)
     if not given.any() and not (accelerations and as_rows(accelerations.Get(at), 3).any()):
         return None
+    if not has_seconds(values.GetStage()):
+        return "timeCodesPerSecond is not positive"
     if not samples or velocities.GetTimeSamples() != samples:
         return f"their time samples are {_named(velocities.GetTimeSamples())}, those of {values.GetName()} {_named(samples)}"
     count = len(values.Get(at) or ())
     return "" if len(given) == count else f"they are {len(given)}, but {values.GetName()} are {count}"
+
+
+def has_seconds(stage: Usd.Stage) -> bool:
+    """Whether time codes are so many a second. Else usd-core divides by 0, and puts what has velocities nowhere."""
+    return math.isfinite(stage.GetTimeCodesPerSecond()) and stage.GetTimeCodesPerSecond() > 0
 
 
 def _named(samples: list[float]) -> str:

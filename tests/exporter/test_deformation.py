@@ -344,19 +344,6 @@ def test_a_normalized_light_has_its_power_whatever_its_shape(export):
         assert own * np.linalg.norm(cross, axis=1).sum() / 2 == pytest.approx([12] * 3, rel=1e-4)
 
 
-def test_one_instance_is_a_light_and_both_deform(export):
-    text = SHOT + 'def "Kit" { ' + cube({1: CORNERS, 5: SQUASHED}) + """ }
-        def Xform "A" (instanceable = true\n references = </Kit>) {}
-        def Xform "B" (instanceable = true\n references = </Kit>) {}
-        def GeometryLight "L" { rel geometry = </A/M> }"""  # fmt: skip
-    result = export(text)
-    scene = Gltf(result.path)
-    for path in ("/A/M", "/B/M"):
-        assert len(scene.primitives(path)[0]["targets"]) == 1
-        assert set(scene.channels(path)) == {"weights"}
-    assert not result.warned("animation")
-
-
 def test_too_many_bytes_keep_the_first_frame(export, monkeypatch):
     text = SHOT + cube({1: CORNERS, 2: SQUASHED, 3: SHEARED, 4: CORNERS * 3, 5: SQUASHED}) + "\n" + cube({1: CORNERS, 5: SHEARED}, name="N")
     monkeypatch.setattr(deformation, "MOST_BYTES", 300)

@@ -1,6 +1,10 @@
 """Meshes that emit: MeshLightAPI, GeometryLight and light:materialSyncMode."""
 
+import numpy as np
 import pytest
+from conftest import Gltf
+from test_deformation import CORNERS, POLYGON, SHOT, SQUASHED, cube
+from usd_gltf.mesh import MeshSource
 
 QUAD = """
     int[] faceVertexCounts = [4]
@@ -143,3 +147,38 @@ def test_a_glow_that_cannot_be_animated_is_a_matter_of_lights(export):
     apis = '["MeshLightAPI", "MaterialBindingAPI"]'
     result = export(ANIMATED_GLOW + f'def Cube "C" (prepend apiSchemas = {apis}) {{ rel material:binding = </Mat> }}')
     assert "animated emissiveColor" in result.warned("lights")
+
+
+def test_one_instance_is_a_light_and_both_deform(export):
+    text = SHOT + 'def "Kit" { ' + cube({1: CORNERS, 5: SQUASHED}) + """ }
+        def Xform "A" (instanceable = true\n references = </Kit>) {}
+        def Xform "B" (instanceable = true\n references = </Kit>) {}
+        def GeometryLight "L" { rel geometry = </A/M> }"""  # fmt: skip
+    result = export(text)
+    scene = Gltf(result.path)
+    for path in ("/A/M", "/B/M"):
+        assert len(scene.primitives(path)[0]["targets"]) == 1
+        assert set(scene.channels(path)) == {"weights"}
+    assert not result.warned("animation")
+
+
+@pytest.mark.parametrize(("scale", "poses"), [("(2, 2, 2)", 1), ("(1, 2, 1)", 2)])
+def test_a_normalized_light_is_posed_once_for_all_its_instances(gltf, monkeypatch, scale, poses):
+    asked, area = [], MeshSource.area
+    monkeypatch.setattr(MeshSource, "area", lambda mesh, linear, code=None: asked.append(code) or area(mesh, linear, code))
+    light = cube({1: CORNERS, 5: SQUASHED}, POLYGON + "\n bool inputs:normalize = 1").replace('"M" {', '"M" (prepend apiSchemas = ["MeshLightAPI"]) {')
+    op = 'float3 xformOp:scale = %s\n uniform token[] xformOpOrder = ["xformOp:scale"]'
+    copy = 'def Xform "%s" (instanceable = true\n references = </Kit>) { %s }\n'
+    text = SHOT + f'def "Kit" {{ {light} }}\n' + "".join(copy % (f"I{n}", op % (scale if n % 2 else "(1, 1, 1)")) for n in range(12))
+    scene = gltf(text)
+    per_mesh = 2 if "/Kit/M" in scene.by_path else 1  # the kit is a mesh of its own
+    assert 0 < len(asked) <= 5 * poses * per_mesh
+    whole, larger = (np.array(scene.lux(f"/I{n}/M")["values"]["rgb"]) for n in (0, 1))
+    if poses == 1:
+        assert larger == pytest.approx(whole / 4, rel=1e-5)
+    for name in ("I0", "I1"):
+        values = scene.lux(f"/{name}/M")["values"]
+        for time, nits in zip(values["times"], values["rgb"], strict=True):
+            found = scene.deformed_triangles(f"/{name}/M", time)
+            cross = np.cross(found[:, 1] - found[:, 0], found[:, 2] - found[:, 0])
+            assert nits[0] * np.linalg.norm(cross, axis=1).sum() / 2 == pytest.approx(1, rel=1e-4)

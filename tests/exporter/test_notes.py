@@ -165,6 +165,34 @@ def test_a_placement_that_is_no_view_is_reported(export, kind, lines):
     assert Gltf(result.path).world("/P") == pytest.approx(np.eye(4))
 
 
+@pytest.mark.parametrize("kind", ["Camera", "SphereLight"])
+@pytest.mark.parametrize("array", [True, False])
+def test_arnolds_placement_over_time_is_carried(export, kind, array):
+    typed = "vector3f[]" if array else "point3f"
+    eyes = [(0, 0, 5), (3, 1, 5), (9, 0, 5)] if array else [(0, 0, 5), (4.5, 0, 5), (9, 0, 5)]
+    samples = [f"{code}: [{eye}]" if array else f"{code}: {eye}" for code, eye in zip((1, 2, 3), eyes, strict=True)]
+    lines = f"{typed} primvars:arnold:position.timeSamples = {{ {', '.join(samples)} }}\n"
+    lines += f"{typed} primvars:arnold:look_at = {'[(1, 0, 0)]' if array else '(1, 0, 0)'}"
+    result = export(FRAMES + f'def {kind} "P" {{ {lines} }}', "--frames", "1-3", "--strict")
+    assert result.code == 0, result.err
+    scene = Gltf(result.path)
+    for step, eye in enumerate(eyes):
+        wanted = Gf.Matrix4d().SetLookAt(Gf.Vec3d(*eye), Gf.Vec3d(1, 0, 0), Gf.Vec3d(0, 1, 0)).GetInverse()
+        assert scene.world("/P", step / 24) == pytest.approx(np.array(wanted).T, abs=1e-5)
+
+
+@pytest.mark.parametrize(("line", "what", "at"), [
+    ("vector3f[] primvars:arnold:position = [(0, 0, 5), (9, 0, 5)]", "primvars:arnold:position with motion keys", [0, 0, 5]),
+    ("float primvars:arnold:position = 4", "primvars:arnold:position is no vector", [0, 0, 0]),
+    ("vector3f[] arnold:position = [(0, nan, 5)]", "arnold:position is no vector", [0, 0, 0]),
+])  # fmt: skip
+@pytest.mark.parametrize(("kind", "category"), [("Camera", "cameras"), ("SphereLight", "lights")])
+def test_a_placement_that_is_no_single_vector_is_told(export, line, what, at, kind, category):
+    result = export(f'def {kind} "P" {{ {line} }}')
+    assert what in result.warned(category)
+    assert Gltf(result.path).world("/P")[:3, 3] == pytest.approx(at)
+
+
 @pytest.mark.parametrize("name", ["primvars:arnold:light", "arnold:light"])
 def test_arnolds_mesh_lights_are_not_lost_in_silence(export, name):
     assert name in export(f'def Cube "C" {{ bool {name} = 1 }}').warned("lights")

@@ -149,3 +149,34 @@ def test_a_shape_that_casts_shadows_vanishes_with_its_light(export):
     result = export(SHOT + f'def RectLight "L" {{ {BLINK}\n bool cycles:visibility:shadow = 1 }}', "--strict")
     assert result.code == 0, result.err
     assert (sizes(Gltf(result.path), "/L") > 0).tolist() == [True, False, False, True, True, False]
+
+
+@pytest.mark.parametrize("kind", ["SphereLight", "SphereLight point", "DistantLight", "DomeLight", "RectLight"])
+@pytest.mark.parametrize("above", [True, False])
+@pytest.mark.parametrize("visibility", [BLINK, LATE])
+def test_lights_that_a_vanishing_instancer_places_are_dark(export, kind, above, visibility):
+    def placed(name, hidden):
+        own, around = ("", hidden) if above else (hidden, "")
+        return f"""def Xform "{name}" {{ {around}\n def PointInstancer "I" {{ {own}\n rel prototypes = </P>
+            int[] protoIndices = [0]\n point3f[] positions = [(1, 0, 0)] }} }}\n"""
+    more = "bool treatAsPoint = 1" if "point" in kind else ""
+    prototype = f'def Xform "P" {{\n def {kind.split()[0]} "L" {{ {more} }} }}\n'
+    result = export(SHOT + placed("A", visibility) + placed("B", "") + prototype, "--strict")
+    assert result.code == 0, result.err
+    scene = Gltf(result.path)
+    seen = visible(result, "/A/I")
+    assert 0 < seen.sum() < 6
+    assert (strengths(scene, "/A/I[0]/L")[:, 0] > 0).tolist() == seen.tolist()
+    assert "values" not in scene.lux("/B/I[0]/L")
+
+
+@pytest.mark.parametrize("visibility", [BLINK, LATE, 'token visibility = "invisible"', 'token visibility.timeSamples = { 1: "invisible", 2: "invisible" }'])
+@pytest.mark.parametrize("beside", ["", 'def Cube "C" {}', 'def SphereLight "L" {}'])
+@pytest.mark.parametrize("own", [True, False])
+def test_a_camera_is_there_whatever_its_visibility(export, visibility, beside, own):
+    outer, inner = ("", visibility) if own else (visibility, "")
+    scene = Gltf(export(SHOT + f'def Xform "X" {{ {outer}\n {beside}\n def Camera "V" {{ {inner} }} }}').path)
+    assert "camera" in scene.node("/X/V")
+    never = not own and "inherited" not in visibility
+    assert ("/X/L" in scene.by_path) == ("Light" in beside and not never)
+    assert ("/X/C" in scene.by_path) == ("Cube" in beside and (own or visibility == BLINK))

@@ -241,3 +241,20 @@ def test_normals_that_are_the_same_do_not_turn(export, last):
     text = normals("faceVarying", "primvars:normals", FLAT, FLAT if last is None else last)
     scene = Gltf(export(shot(START + 4) + cube(at("point3f[] points", CORNERS, None), text), "--strict").path)
     assert "targets" not in scene.primitives("/M")[0]
+
+
+@pytest.mark.parametrize("per_second", ["0", "-24"])
+def test_without_seconds_nothing_moves_and_it_is_told(export, per_second):
+    """usd-core divides by `timeCodesPerSecond`."""
+    mesh = cube(at("point3f[] points", CORNERS), at("vector3f[] velocities", TURNS))
+    placed = instancer(at("point3f[] positions", PLACES), at("vector3f[] velocities", SPEEDS), "float3[] scales = [(1, 2, 3), (1, 1, 1), (2, 2, 2)]\n",
+                       "quath[] orientations = [(1, 0, 0, 0), (0.6, 0.8, 0, 0), (1, 0, 0, 0)]\n")  # fmt: skip
+    result = export(shot(START + 1, per_second) + mesh + "\n" + placed)
+    assert result.code == 0
+    assert {"velocities without effect", "timeCodesPerSecond is not positive"} <= result.warned("animation")
+    scene = Gltf(result.path)
+    assert corners_of(shown(scene, "/M", START)) == pytest.approx(CORNERS) and "targets" not in scene.primitives("/M")[0]
+    still = Gltf(export(shot(START + 1) + placed.replace("vector3f[] velocities", "custom vector3f[] unused"), out="still.glb").path)
+    for number in range(3):
+        path = f"/I[{number}]"
+        assert scene.world(path) == pytest.approx(still.world(path), abs=1e-5) and not scene.channels(path)
