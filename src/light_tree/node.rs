@@ -127,7 +127,7 @@ impl Node {
             aabb: Aabb { min: round_down(center - half), max: -round_down(-center - half) },
             cone,
             energy: self.energy,
-            // Spheres make a cluster round, so these are faces and spots. It is that of the widest.
+            // Spheres make a cluster round, so these are faces and spots. All count like the widest of them.
             share: if is_round {
                 decode_share(self.theta_e)
             } else {

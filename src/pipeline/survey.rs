@@ -96,10 +96,10 @@ pub enum SurveyError {
     Overflow(#[from] LightOverflow),
     /// Lights that change, in so many frames.
     #[error(
-        "lights that change have more than {most} emitters in all, by frame {frame}; build fewer frames at a time (--frames)"
+        "lights that change have more than {most} emitters in all, by frame {frame}; `candelabra build --frames` takes fewer frames"
     )]
     TooMany {
-        /// The most that a build takes: about 100 bytes of memory each.
+        /// The most that a build takes.
         most: usize,
         /// The frame that is one too many.
         frame: i32,
