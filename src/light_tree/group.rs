@@ -39,7 +39,6 @@ pub(super) struct Lanes {
     axis: [[f32; WIDTH]; 3],
     sin_half_theta_o: [f32; WIDTH],
     cos_theta_e: [f32; WIDTH],
-    share: [f32; WIDTH],
     /// Nonzero if it is.
     two_sided: [u32; WIDTH],
     inverse_range2: [f32; WIDTH],
@@ -146,7 +145,6 @@ impl Group {
             axis: [x, y, z],
             sin_half_theta_o: each(|lane| node::decode_sin_half_theta_o(self.theta_o[lane])),
             cos_theta_e: each(|lane| node::decode_cos_theta_e(self.theta_e[lane])),
-            share: each(|lane| node::decode_share(self.theta_e[lane])),
             two_sided: each(|lane| u32::from(node::is_two_sided(self.theta_o[lane]))),
             inverse_range2: if ENDLESS {
                 [0.0; WIDTH]
@@ -231,7 +229,6 @@ impl Lanes {
             // A constant tells the compiler what can be left out.
             sin_half_theta_o: if ROUND { 1.0 } else { self.sin_half_theta_o[lane] },
             cos_theta_e: self.cos_theta_e[lane],
-            share: self.share[lane],
             two_sided: self.two_sided[lane] != 0,
             inverse_range2: if ENDLESS { 0.0 } else { self.inverse_range2[lane] },
         }

@@ -58,9 +58,8 @@ pub struct Cluster {
     /// Not of unit length.
     pub axis: [f32; 3],
     pub sin_half_theta_o: f32,
+    /// Where normals point everywhere, 1 less the share.
     pub cos_theta_e: f32,
-    /// What leaves in the mean over all directions, as a share of the largest; used where normals point everywhere.
-    pub share: f32,
     pub two_sided: bool,
     /// `1 / range^2` of the longest range in it, 1/m^2; 0 if any light in it has no range.
     pub inverse_range2: f32,
@@ -97,6 +96,12 @@ impl Cluster {
     #[inline(always)]
     fn is_round(&self) -> bool {
         self.sin_half_theta_o >= 1.0
+    }
+
+    /// What leaves in the mean over all directions, over the largest, where normals point everywhere.
+    #[inline(always)]
+    fn share(&self) -> f32 {
+        1.0 - self.cos_theta_e
     }
 
     /// The share of its light that leaves at some angle off its axis, for a cluster seen under the half
@@ -152,8 +157,9 @@ impl Cluster {
         let of_cone = ((front + back) * beam, (front2 + back2) * beam);
         // Faces have a mean square of 1/6, or 1/3 if they emit from both sides, spheres 1; between them it is a line.
         let (of_faces, square) = if self.two_sided { (0.5, 1.0 / 3.0) } else { (0.25, 1.0 / 6.0) };
-        let square = 1.0 - (1.0 - self.share) * ((1.0 - square) / (1.0 - of_faces));
-        let of_all = (self.share, square.max(self.share * FACES));
+        let share = self.share();
+        let square = 1.0 - (1.0 - share) * ((1.0 - square) / (1.0 - of_faces));
+        let of_all = (share, square.max(share * FACES));
         let moments = if self.is_round() { of_all } else { of_cone };
         (moments.0.max(LEAST_EXPECTED * emission), deviation(moments))
     }
@@ -163,7 +169,7 @@ impl Cluster {
     #[inline(always)]
     pub fn missed(&self, cos_o: f32) -> f32 {
         let missed = if self.is_round() {
-            1.0 / self.share.max(1e-9) - 4.0
+            1.0 / self.share().max(1e-9) - 4.0
         } else {
             (1.0 - cos_o) / (1.0 - self.cos_theta_e).max(1e-9) - 2.0
         };

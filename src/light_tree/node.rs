@@ -169,7 +169,6 @@ impl Node {
             axis: decode_axis(self.axis),
             sin_half_theta_o: decode_sin_half_theta_o(self.theta_o),
             cos_theta_e: decode_cos_theta_e(self.theta_e),
-            share: decode_share(self.theta_e),
             two_sided: is_two_sided(self.theta_o),
             inverse_range2: decode_inverse_range2(self.range),
         }
@@ -329,7 +328,7 @@ pub(super) fn decode_cos_theta_e(code: u8) -> f32 {
 
 /// What the code of `theta_e` says where normals point everywhere.
 #[inline(always)]
-pub(super) fn decode_share(code: u8) -> f32 {
+fn decode_share(code: u8) -> f32 {
     let root = f32::from(code) * (1.0 / THETA_E_STEPS as f32);
     root * root
 }

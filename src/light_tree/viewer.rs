@@ -118,7 +118,7 @@ impl<V: Viewer> Viewer for DistanceOnly<V> {
 
     #[inline(always)]
     fn factors(&self, cluster: &Cluster) -> Factors {
-        self.0.factors(&Cluster { sin_half_theta_o: 1.0, share: 1.0, ..*cluster })
+        self.0.factors(&Cluster { sin_half_theta_o: 1.0, cos_theta_e: 0.0, ..*cluster })
     }
 
     #[inline(always)]

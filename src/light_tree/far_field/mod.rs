@@ -94,7 +94,7 @@ impl FrameFields<'_> {
             }
             let mut cluster = group.cluster(lane);
             // As if light left alike in every direction.
-            (cluster.sin_half_theta_o, cluster.share) = (1.0, 1.0);
+            (cluster.sin_half_theta_o, cluster.cos_theta_e) = (1.0, 0.0);
             let factors = place.viewer.factors(&cluster);
             let sight = factors.sight;
             let direction = -Vec3::from_array(sight.to);
