@@ -1,6 +1,7 @@
 //! Prim paths, each given once.
 
 use std::collections::HashMap;
+use std::sync::Arc;
 
 /// A name longer than this is cut: paths repeat the names of all ancestors.
 const LONGEST_NAME: usize = 128;
@@ -9,24 +10,30 @@ const LONGEST_NAME: usize = 128;
 #[derive(Default)]
 pub(super) struct PrimPaths {
     /// Every path given, with the last number that was tried after it.
-    given: HashMap<String, u32>,
+    given: HashMap<Arc<str>, u32>,
 }
 
 impl PrimPaths {
-    pub(super) fn claim(&mut self, wanted: String) -> String {
-        if !self.given.contains_key(&wanted) {
-            self.given.insert(wanted.clone(), 1);
-            return wanted;
-        }
-        let mut number = self.given[&wanted];
-        let free = loop {
-            number += 1;
-            let numbered = format!("{wanted}_{number}");
-            if !self.given.contains_key(&numbered) {
-                break numbered;
+    /// With room for so many.
+    pub(super) fn with_room(paths: usize) -> PrimPaths {
+        PrimPaths { given: HashMap::with_capacity(paths) }
+    }
+
+    pub(super) fn claim(&mut self, wanted: &str) -> Arc<str> {
+        let free: Arc<str> = match self.given.get(wanted).copied() {
+            None => wanted.into(),
+            Some(mut number) => {
+                let free = loop {
+                    number += 1;
+                    let numbered = format!("{wanted}_{number}");
+                    if !self.given.contains_key(numbered.as_str()) {
+                        break numbered.into();
+                    }
+                };
+                self.given.insert(wanted.into(), number);
+                free
             }
         };
-        self.given.insert(wanted, number);
         self.given.insert(free.clone(), 1);
         free
     }
@@ -50,8 +57,8 @@ mod tests {
     #[test]
     fn paths_are_unique() {
         let mut paths = PrimPaths::default();
-        let given: Vec<_> = ["/a", "/a", "/a_2", "/a"].map(|p| paths.claim(p.into())).into();
-        assert_eq!(given, ["/a", "/a_2", "/a_2_2", "/a_3"]);
+        let given: Vec<_> = ["/a", "/a", "/a_2", "/a"].map(|p| paths.claim(p)).into();
+        assert_eq!(given, ["/a", "/a_2", "/a_2_2", "/a_3"].map(Arc::from));
     }
 
     #[test]

@@ -99,7 +99,11 @@ impl CameraReport {
             Projection::Perspective { yfov_rad } => (Some(yfov_rad.to_degrees()), None),
             Projection::Orthographic { height_m } => (None, Some(height_m)),
         };
-        CameraReport { path: scene.nodes[camera.node as usize].path.clone(), height_deg, height_m }
+        CameraReport {
+            path: scene.nodes[camera.node as usize].path.to_string(),
+            height_deg,
+            height_m,
+        }
     }
 }
 

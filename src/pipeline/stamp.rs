@@ -110,7 +110,7 @@ impl Stamper {
         let text =
             format!("{SOFTWARE} {ALGORITHM_VERSION} {camera:?} {place:?} {rest:?} {settings}");
         common.update(text.as_bytes());
-        let camera = json!({ "path": place[0].path, "exposure_scale": camera.exposure_scale });
+        let camera = json!({ "path": &*place[0].path, "exposure_scale": camera.exposure_scale });
         Ok(Stamper { common, settings, camera })
     }
 

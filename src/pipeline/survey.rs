@@ -213,7 +213,7 @@ impl Survey {
                 None => sum(group.own_bounds(light)),
             });
             LightSummary {
-                path: light.path.clone(),
+                path: light.path.to_string(),
                 fingerprint: self.fingerprint_of(row as u32, light),
                 emitter_count: light.count,
                 energy: energy.min(f64::from(f32::MAX)) as f32,

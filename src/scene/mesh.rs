@@ -34,7 +34,7 @@ pub struct Mesh {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Instance {
     /// The prim's path; unique in the scene.
-    pub path: String,
+    pub path: Arc<str>,
     /// The node it stands at.
     pub node: u32,
     /// Index into [`Scene::meshes`](super::Scene::meshes).

@@ -7,12 +7,13 @@ use super::{Scene, Timeline};
 use crate::math::built_in;
 use crate::math::color::Rgb;
 use glam::{Affine3A, DAffine3, DQuat, DVec3, Quat, Vec3};
+use std::sync::Arc;
 
 /// A place in the transform hierarchy.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Node {
     /// The prim path, `/World/Lamps/lamp_12`; unique in the scene.
-    pub path: String,
+    pub path: Arc<str>,
     /// Index of the parent, smaller than this node's own.
     pub parent: Option<u32>,
     /// Local to parent, where no channel says otherwise.
@@ -218,7 +219,7 @@ impl Node {
     }
 
     /// A node that stands still.
-    pub fn fixed(path: impl Into<String>, parent: Option<u32>, local: Trs) -> Node {
+    pub fn fixed(path: impl Into<Arc<str>>, parent: Option<u32>, local: Trs) -> Node {
         Node { path: path.into(), parent, local, channels: Vec::new() }
     }
 

@@ -195,7 +195,7 @@ pub fn scene_of(prims: &[Prim]) -> Scene {
             Kind::Flame => 2,
         };
         scene.instances.push(Instance {
-            path,
+            path: path.into(),
             node,
             mesh,
             values,

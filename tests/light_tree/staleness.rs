@@ -136,13 +136,13 @@ fn move_node(
     path: &str,
     change: impl FnOnce(&mut DVec3, &mut DQuat, &mut DVec3),
 ) {
-    let node = scene.nodes.iter_mut().find(|node| node.path == path).unwrap();
+    let node = scene.nodes.iter_mut().find(|node| &*node.path == path).unwrap();
     let Trs::Parts { translation, rotation, scale } = &mut node.local else { unreachable!() };
     change(translation, rotation, scale);
 }
 
 fn channels<'a>(scene: &'a mut Scene, path: &str) -> &'a mut Vec<Channel> {
-    &mut scene.nodes.iter_mut().find(|node| node.path == path).unwrap().channels
+    &mut scene.nodes.iter_mut().find(|node| &*node.path == path).unwrap().channels
 }
 
 type Edits<T> = Vec<(&'static str, T, fn(&mut Scene))>;

@@ -3,7 +3,7 @@
 //! A channel that cannot be read is left out; one whose keys are only partly good keeps those.
 
 use super::accessors::Accessor;
-use super::document::{Target, Transform, label};
+use super::document::{Node, Target, label};
 use super::posing::Weights;
 use super::{Output, Source};
 use crate::ingest::error::Fault;
@@ -55,9 +55,8 @@ pub(super) fn compile(source: &Source, output: &mut Output) -> Result<Animated, 
                 output.notes.add(category, format!("{object}, {what}"), text);
                 continue;
             };
-            let transform = document.beside.transforms.get(node);
-            let can = |transform: &Transform| path == WEIGHTS || transform.matrix.is_none();
-            if !transform.is_some_and(can) {
+            let can = |node: &Node| path == WEIGHTS || node.transform.matrix.is_none();
+            if !document.nodes.get(node).is_some_and(can) {
                 let text = "moves nothing that could move; left out";
                 output.notes.add(Category::Animation, &*object, text);
                 continue;

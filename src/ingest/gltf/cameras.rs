@@ -3,11 +3,11 @@
 //! No camera is a reason to refuse a scene: most of what a scene is used for needs none. A number
 //! that makes no sense is mended and noted, and a camera that shows nothing is left out and noted.
 
-use super::document::{UsdCamera, reals};
+use super::document::{Node, UsdCamera, reals};
 use super::{Output, Source};
 use crate::ingest::notes::Notes;
 use crate::scene::{Camera, Category, Projection, Shutter};
-use gltf::json::{Camera as Row, Index, Node};
+use gltf::json::{Camera as Row, Index};
 use std::f32::consts::PI;
 
 /// The field of view that is taken where the file's is none, degrees.

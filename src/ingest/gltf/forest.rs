@@ -1,6 +1,6 @@
 //! The nodes as they can be walked: without cycles, and not too deep.
 
-use super::document::{Document, label};
+use super::document::{Document, Node, label};
 use crate::ingest::error::Fault;
 use crate::ingest::notes::Notes;
 use crate::scene::Category;
@@ -21,11 +21,12 @@ impl Forest {
         let nodes = &document.nodes;
         let mut parents = vec![0u32; nodes.len()];
         let mut children = vec![Vec::new(); nodes.len()];
-        for (i, node) in nodes.iter().enumerate() {
+        let is_parent = |(_, node): &(usize, &Node)| !node.children.is_empty();
+        for (i, node) in nodes.iter().enumerate().filter(is_parent) {
             let mut note = |text| {
                 notes.add(Category::Geometry, label("node", i, node.name.as_deref()), text);
             };
-            let listed: Vec<usize> = node.children.iter().flatten().map(|c| c.value()).collect();
+            let listed: Vec<usize> = node.children.iter().map(|&child| child as usize).collect();
             let mut known = listed.clone();
             known.sort_unstable();
             known.dedup();

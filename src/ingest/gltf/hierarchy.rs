@@ -1,7 +1,7 @@
 //! Nodes, parents first, and what stands at them.
 
 use super::animation::{self, Animated};
-use super::document::{Real, Transform, UsdFog, UsdLux, label, usd_path};
+use super::document::{Node as Row, Real, Transform, UsdFog, UsdLux, label, usd_path};
 use super::geometry::{Compiled, Meshes};
 use super::lights::{self, Placed};
 use super::links::LinkTable;
@@ -12,7 +12,7 @@ use crate::ingest::error::Fault;
 use crate::ingest::paths::{PrimPaths, component};
 use crate::scene::{Category, Channel, Instance, Light, Links, Node, Trs};
 use glam::{DAffine3, DMat4, DQuat, DVec3};
-use gltf::json::{Index, Mesh, Node as Row};
+use gltf::json::{Index, Mesh};
 use std::collections::HashMap;
 use std::mem;
 
@@ -65,7 +65,7 @@ pub(super) fn compile(source: &Source, output: &mut Output) -> Result<(), Fault>
         hanging: Vec::new(),
         placed: vec![None; source.document.nodes.len()],
         meshes: Meshes::new(source),
-        paths: PrimPaths::default(),
+        paths: PrimPaths::with_room(source.document.nodes.len()),
         links: LinkTable::default(),
         profiles: Profiles::default(),
         uniform: Vec::new(),
@@ -85,7 +85,7 @@ pub(super) fn compile(source: &Source, output: &mut Output) -> Result<(), Fault>
         if visible {
             walk.furnish(output, number, row, node, &object)?;
         } else if row.mesh.is_some()
-            || source.document.light_at(number).is_some()
+            || row.light.is_some()
             || UsdFog::of(&row.extras, &object)?.is_some()
         {
             // The file says that it is not to be seen: nothing is lost.
@@ -126,16 +126,22 @@ impl Walk<'_> {
                 channels.clone()
             }
         };
-        let local = local(&self.source.document.beside.transforms[number], |text| {
+        let local = local(&row.transform, |text| {
             output.notes.add(Category::Geometry, object(), text);
         });
-        let node = self.push(output, Node { path, parent, local, channels })?;
+        let node = self.push(output, &path, parent, (local, channels))?;
         self.placed[number].get_or_insert(node);
         Ok(node)
     }
 
-    fn push(&mut self, output: &mut Output, mut node: Node) -> Result<u32, Fault> {
-        node.path = self.paths.claim(node.path);
+    fn push(
+        &mut self,
+        output: &mut Output,
+        path: &str,
+        parent: Option<u32>,
+        (local, channels): (Trs, Vec<Channel>),
+    ) -> Result<u32, Fault> {
+        let mut node = Node { path: self.paths.claim(path), parent, local, channels };
         node.settle();
         let bytes = size_of::<Node>() + 2 * node.path.len();
         output.budget.take(bytes as u64, || "nodes".to_string())?;
@@ -224,7 +230,7 @@ impl Walk<'_> {
         };
         for (i, local) in locals.into_iter().enumerate() {
             let path = format!("{}[{i}]", output.scene.nodes[node as usize].path);
-            let child = self.push(output, Node::fixed(path, Some(node), local))?;
+            let child = self.push(output, &path, Some(node), (local, Vec::new()))?;
             // The light of a node is not its instances'.
             let placed = Placed { has_light: false, ..placed };
             self.put_mesh(output, mesh, child, &placed, &pose)?;
@@ -268,9 +274,9 @@ impl Walk<'_> {
             let own = usd_path(&row.primitives[i].extras);
             let own = own.as_deref().and_then(|path| path.rsplit('/').next());
             let path = match own {
-                Some(own) => self.paths.claim(format!("{above}/{own}")),
-                None if row.primitives.len() > 1 => self.paths.claim(format!("{above}/prim_{i}")),
-                None if placed.has_light => self.paths.claim(format!("{above}/mesh")),
+                Some(own) => self.paths.claim(&format!("{above}/{own}")),
+                None if row.primitives.len() > 1 => self.paths.claim(&format!("{above}/prim_{i}")),
+                None if placed.has_light => self.paths.claim(&format!("{above}/mesh")),
                 None => above,
             };
             let Placed { shaping, forced, visibility, links, .. } = *placed;
@@ -308,7 +314,8 @@ impl Walk<'_> {
                 None => {
                     let path = format!("{}/posed", output.scene.nodes[from as usize].path);
                     let parent = hung.below.and_then(|row| self.placed[row]);
-                    let node = self.push(output, Node::fixed(path, parent, Trs::default()))?;
+                    let still = (Trs::default(), Vec::new());
+                    let node = self.push(output, &path, parent, still)?;
                     keep_group(output, from, node)?;
                     *known.entry(key).or_insert(node)
                 }
@@ -325,7 +332,7 @@ fn keep_group(output: &mut Output, of: u32, node: u32) -> Result<(), Fault> {
     let mut above = std::iter::successors(Some(of), |&node| scene.nodes[node as usize].parent);
     if let Some(group) = above.find_map(|node| scene.light_groups.get(&node)).cloned() {
         let bytes = size_of::<(u32, String)>() + group.len();
-        output.budget.take(bytes as u64, || scene.nodes[node as usize].path.clone())?;
+        output.budget.take(bytes as u64, || scene.nodes[node as usize].path.to_string())?;
         scene.light_groups.insert(node, group);
     }
     Ok(())
@@ -333,7 +340,7 @@ fn keep_group(output: &mut Output, of: u32, node: u32) -> Result<(), Fault> {
 
 /// The transform of a node. Whatever it says can be composed; what had to be mended is noted.
 pub(super) fn local(row: &Transform, mut note: impl FnMut(&'static str)) -> Trs {
-    if let Some(matrix) = row.matrix {
+    if let Some(matrix) = row.matrix.as_deref() {
         let columns = matrix.map(|value| value.f64());
         let last_row = [columns[3], columns[7], columns[11], columns[15] - 1.0];
         if last_row.iter().any(|part| part.abs() > AFFINE_TOLERANCE) {
@@ -345,7 +352,8 @@ pub(super) fn local(row: &Transform, mut note: impl FnMut(&'static str)) -> Trs 
         return Trs::Matrix(DAffine3::from_mat4(DMat4::from_cols_array(&columns)));
     }
     let vector = |values: [Real; 3]| DVec3::from(values.map(|value| value.f64()));
-    let rotation = row.rotation.map(|parts| DQuat::from_array(parts.map(|part| part.f64())));
+    let rotation =
+        row.rotation.as_deref().map(|parts| DQuat::from_array(parts.map(|part| part.f64())));
     let rotation = rotation.unwrap_or(DQuat::IDENTITY);
     let length = rotation.length();
     if (length - 1.0).abs() > QUATERNION_TOLERANCE {
@@ -357,6 +365,6 @@ pub(super) fn local(row: &Transform, mut note: impl FnMut(&'static str)) -> Trs 
     Trs::Parts {
         translation: row.translation.map_or(DVec3::ZERO, vector),
         rotation: if has_direction { rotation / length } else { DQuat::IDENTITY },
-        scale: row.scale.map_or(DVec3::ONE, vector),
+        scale: row.scale.as_deref().copied().map_or(DVec3::ONE, vector),
     }
 }

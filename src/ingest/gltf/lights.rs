@@ -68,7 +68,7 @@ pub(super) fn of_node(
     if let Some(lux) = lux.filter(|lux| lux.kind == "DomeLight") {
         return Ok(dome(source, output, lux, object)?.map(|kind| light(kind, None)));
     }
-    let Some(index) = source.document.light_at(number) else {
+    let Some(index) = source.document.nodes[number].light else {
         if let Some(lux) = lux.filter(|_| source.document.nodes[number].mesh.is_none()) {
             let text = format!("a {} has no carrier in glTF; left out", lux.kind);
             output.notes.add(Category::Lights, object, text);

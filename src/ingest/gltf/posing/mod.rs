@@ -30,7 +30,7 @@ mod weights;
 pub(super) use weights::Weights;
 
 use super::attributes::Attributes;
-use super::document::{label, morph_targets};
+use super::document::{Node, label, morph_targets};
 use super::geometry::Vertices;
 use super::{Output, Source};
 use crate::ingest::error::Fault;
@@ -38,7 +38,7 @@ use crate::scene::{Category, Channel, Deformation, Mesh, Shape};
 use glam::{Vec3, Vec4};
 use gltf::json::mesh::{Primitive, Semantic};
 use gltf::json::validation::Checked;
-use gltf::json::{Index, Mesh as Row, Node};
+use gltf::json::{Index, Mesh as Row};
 use rig::Rig;
 use std::collections::BTreeMap;
 

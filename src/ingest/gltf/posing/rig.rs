@@ -56,8 +56,7 @@ impl Rig {
             }
             for row in path.into_iter().rev() {
                 let parent = parents[&row];
-                let mut node =
-                    Node::fixed("", None, local(&document.beside.transforms[row], |_| {}));
+                let mut node = Node::fixed("", None, local(&document.nodes[row].transform, |_| {}));
                 let keys = channels[row].iter().map(byte_length).sum();
                 output.budget.take(keys, || "skins".to_string())?;
                 node.channels = channels[row].clone();
