@@ -27,6 +27,7 @@
 mod camera;
 mod deformation;
 mod ies_profile;
+mod lens;
 mod light;
 mod linking;
 mod material;
@@ -47,6 +48,7 @@ mod visibility;
 pub use camera::{Camera, Projection};
 pub use deformation::{Deformation, FARTHEST_M, Shape, Skeleton, Skin, Target, is_near};
 pub use ies_profile::{IesProfile, IesTable, LitCone, Pole};
+pub use lens::LensKeys;
 pub use light::{Light, LightKind, Shaping};
 pub use linking::{LinkRows, Linking, Links, Membership};
 pub use material::{AlphaMode, Coat, Material, Transmission, Volume};
@@ -66,6 +68,9 @@ use crate::math::built_in;
 use glam::DVec3;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
+
+/// USD's name of a stage's primary camera (`UsdUtilsGetPrimaryCameraName`).
+const MAIN_CAMERA: &str = "main_cam";
 
 /// Everything ingest found, by index. See the [module page](self).
 #[derive(Debug, Default)]
@@ -173,6 +178,22 @@ impl Scene {
     /// The prim path of a light.
     pub fn light_path(&self, light: usize) -> &str {
         &self.nodes[self.lights[light].node as usize].path
+    }
+
+    /// The camera that is looked through if none is named: one called `main_cam`, as in `usdrecord`, or else the
+    /// first. One that the file hides is looked through only if it hides all.
+    pub fn default_camera(&self) -> Option<&Camera> {
+        let is_main = |camera: &&Camera| {
+            let path = &self.nodes[camera.node as usize].path;
+            path.rsplit('/').next() == Some(MAIN_CAMERA)
+        };
+        let choose = |is_hidden: bool| {
+            let mut of_these =
+                self.cameras.iter().filter(move |camera| camera.is_hidden == is_hidden);
+            let first = of_these.clone().next();
+            of_these.find(is_main).or(first)
+        };
+        choose(false).or_else(|| choose(true))
     }
 
     /// Which features of the renderer and the tree this scene switches on.

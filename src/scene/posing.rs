@@ -48,11 +48,11 @@ impl<'a> Posing<'a> {
         }
         for &row in &self.lights {
             let values = scene.lights[row].values.as_ref();
-            pose.light_rgb[row] = values.map(|keys| keys.vector_at(at).as_vec3());
+            pose.light_rgb[row] = values.map(|keys| keys.blend_at(at).as_vec3());
         }
         for &row in &self.instances {
             let values = scene.instances[row].values.as_ref();
-            pose.instance_rgb[row] = values.map(|keys| keys.vector_at(at).as_vec3());
+            pose.instance_rgb[row] = values.map(|keys| keys.blend_at(at).as_vec3());
         }
         pose.shapes.set_time(scene, at.time_s);
         pose

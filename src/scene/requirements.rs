@@ -62,6 +62,8 @@ pub struct Requirements {
     pub deforming_meshes: usize,
     /// Cameras with a lens.
     pub lenses: usize,
+    /// Cameras whose lens, exposure or clipping planes vary with time.
+    pub lenses_over_time: usize,
     /// Orthographic cameras.
     pub orthographic_cameras: usize,
     /// Cameras with a shutter.
@@ -135,7 +137,8 @@ impl Requirements {
         needs.glossy += usize::from(scene.meshes.iter().any(|mesh| mesh.material.is_none()));
         needs.deforming_meshes = scene.meshes.iter().filter(|m| m.deformation.is_some()).count();
         needs.fog = usize::from(scene.medium.is_some());
-        needs.lenses = scene.cameras.iter().filter(|c| c.lens_radius_m > 0.0).count();
+        needs.lenses = scene.cameras.iter().filter(|c| c.has_lens()).count();
+        needs.lenses_over_time = scene.cameras.iter().filter(|c| c.over_time.is_some()).count();
         let is_parallel = |c: &&Camera| matches!(c.projection, Projection::Orthographic { .. });
         needs.orthographic_cameras = scene.cameras.iter().filter(is_parallel).count();
         needs.shutters = scene.cameras.iter().filter(|c| c.shutter.is_some()).count();

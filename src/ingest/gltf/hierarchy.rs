@@ -10,11 +10,12 @@ use super::profiles::Profiles;
 use super::{Output, Source, cameras, fog, instancing};
 use crate::ingest::error::Fault;
 use crate::ingest::paths::{PrimPaths, component};
-use crate::scene::{Category, Channel, Instance, Light, Links, Node, Trs};
+use crate::scene::{Category, Channel, Instance, LensKeys, Light, Links, Node, Trs};
 use glam::{DAffine3, DMat4, DQuat, DVec3};
 use gltf::json::{Index, Mesh, Node as Row};
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 use std::mem;
+use std::sync::Arc;
 
 /// How far a scale may be from uniform for a sphere to stay a sphere.
 const UNIFORM_TOLERANCE: f64 = 1e-4;
@@ -42,6 +43,8 @@ struct Hanging {
 struct Walk<'a> {
     source: &'a Source<'a>,
     channels: Vec<Vec<Channel>>,
+    /// By camera of the file.
+    lenses: BTreeMap<usize, Arc<LensKeys>>,
     /// For each node of the file where it was placed first.
     placed: Vec<Option<u32>>,
     meshes: Meshes,
@@ -57,11 +60,12 @@ struct Walk<'a> {
 
 /// Compiles the nodes of the file's scene and everything at them.
 pub(super) fn compile(source: &Source, output: &mut Output) -> Result<(), Fault> {
-    let Animated { channels, weights } = animation::compile(source, output)?;
+    let Animated { channels, weights, lenses } = animation::compile(source, output)?;
     let mut walk = Walk {
         source,
         poses: Poses::new(source, output, &channels, weights)?,
         channels,
+        lenses,
         hanging: Vec::new(),
         placed: vec![None; source.document.nodes.len()],
         meshes: Meshes::new(source),
@@ -82,6 +86,10 @@ pub(super) fn compile(source: &Source, output: &mut Output) -> Result<(), Fault>
         let visible = visible && !source.document.beside.hidden.contains(&number);
         let node = walk.place(output, number, row, parent)?;
         let object = label("node", number, row.name.as_deref());
+        if let Some(camera) = row.camera {
+            let camera = (camera, walk.lenses.get(&camera.value()));
+            cameras::compile(source, output, camera, row, (node, !visible), &object)?;
+        }
         if visible {
             walk.furnish(output, number, row, node, &object)?;
         } else if row.mesh.is_some()
@@ -145,7 +153,7 @@ impl Walk<'_> {
         Ok(output.scene.nodes.len() as u32 - 1)
     }
 
-    /// Adds the camera, fog, light and meshes of a node.
+    /// Adds the fog, light and meshes of a node.
     fn furnish(
         &mut self,
         output: &mut Output,
@@ -154,9 +162,6 @@ impl Walk<'_> {
         node: u32,
         object: &str,
     ) -> Result<(), Fault> {
-        if let Some(camera) = row.camera {
-            cameras::compile(self.source, output, camera, row, node, object);
-        }
         let membership = self.links.membership(output, &row.extras, None, object)?;
         let had_fog = output.scene.medium.is_some();
         fog::of_node(output, &row.extras, node, object)?;

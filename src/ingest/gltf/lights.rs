@@ -14,7 +14,7 @@ use gltf::json::validation::Checked;
 use std::f32::consts::{FRAC_PI_2, FRAC_PI_4};
 
 /// More keys than this are refused: half a day of frames at 24 a second.
-const MOST_KEYS: usize = 1 << 20;
+pub(super) const MOST_KEYS: usize = 1 << 20;
 
 /// What a node says of the meshes at it.
 #[derive(Clone, Copy)]

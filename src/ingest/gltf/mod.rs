@@ -16,7 +16,7 @@
 //! | `instancing`, `geometry`, `attributes` | meshes |
 //! | `posing` | skins and morph targets |
 //! | `materials`, `glossiness`, `coat`, `glass`, `textures` | surfaces |
-//! | `lights`, `fog`, `cameras`, `animation` | what they say |
+//! | `lights`, `fog`, `cameras`, `lenses`, `animation` | what they say |
 //! | `links` | which lights light what |
 
 mod accessors;
@@ -35,6 +35,7 @@ mod glass;
 mod glossiness;
 mod hierarchy;
 mod instancing;
+mod lenses;
 mod lights;
 mod links;
 mod materials;

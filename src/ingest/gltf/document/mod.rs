@@ -11,7 +11,7 @@ mod reference;
 
 pub(super) use beside::{Beside, Instancing, Target, Transform};
 pub(super) use extras::{
-    AssetUsd, UsdCamera, UsdFog, UsdIes, UsdLinks, UsdLux, UsdValues, usd_path,
+    AssetUsd, UsdCamera, UsdFog, UsdIes, UsdLens, UsdLinks, UsdLux, UsdValues, usd_path,
 };
 pub(super) use real::{Real, reals};
 
