@@ -231,7 +231,8 @@ class PrimTree:
                 compiled.light_path = str(light_prim.GetPath())
                 self._lit_geometry.add(str(path))
         elif prim.IsA(UsdGeom.Camera):
-            compiled.camera = read_camera(prim, self.frames, self.meters_per_unit, self.report.about("cameras"))
+            is_hidden = seen.at is not None and not seen.at.any()
+            compiled.camera = read_camera(prim, self.frames, self.meters_per_unit, is_hidden, self.report.about("cameras"))
         elif kind == "GeometryLight":
             if not prim.GetRelationship("geometry").GetTargets():
                 self.lights.warn(path, "GeometryLight emits nothing", "its geometry relationship is empty")

@@ -99,7 +99,7 @@ impl Side {
     /// A scene that has been read. It is looked at through its first camera, if it has one.
     pub fn of_scene(scene: Scene) -> Side {
         let name = SideName { file: scene.source.display().to_string(), is_tree: false };
-        let camera = scene.cameras.first().cloned();
+        let camera = scene.default_camera().cloned();
         Side { name, content: Content::Scene(Box::new(scene)), camera }
     }
 

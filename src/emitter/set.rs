@@ -136,7 +136,7 @@ impl Emitters {
                     path: scene.nodes[light.node as usize].path.clone(),
                     source: LightSource::Light(i as u32),
                     moves: moving[light.node as usize],
-                    varies: light.values.as_ref().is_some_and(Keys::varies),
+                    varies: light.values.as_deref().is_some_and(Keys::varies),
                     deforms: false,
                     forced: light.forced,
                     in_own_space: false,
@@ -317,7 +317,7 @@ fn mesh_entries(
         let deforms = scene.changes_shape(instance.mesh);
         let count = mesh_lights[mesh_light as usize].count;
         let (moves, varies) =
-            (moving[instance.node as usize], instance.values.as_ref().is_some_and(Keys::varies));
+            (moving[instance.node as usize], instance.values.as_deref().is_some_and(Keys::varies));
         let is_shared = users[mesh_light as usize] > 1 || moves || varies;
         let is_placed = !(deforms || (moves && is_blurred)) && keeps_shapes(instance.node);
         Some(LightEntry {

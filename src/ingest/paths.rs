@@ -1,6 +1,6 @@
 //! Prim paths, each given once.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 use std::sync::Arc;
 
 /// A name longer than this is cut: paths repeat the names of all ancestors.
@@ -9,32 +9,28 @@ const LONGEST_NAME: usize = 128;
 /// Gives out paths; one that is taken gets a number: `/World/lamp`, `/World/lamp_2`.
 #[derive(Default)]
 pub(super) struct PrimPaths {
-    /// Every path given, with the last number that was tried after it.
-    given: HashMap<Arc<str>, u32>,
+    /// Every path given.
+    given: HashSet<Arc<str>>,
+    /// The last number that was tried after a path, of those that were wanted again.
+    tried: HashMap<Arc<str>, u32>,
 }
 
 impl PrimPaths {
     /// With room for so many.
     pub(super) fn with_room(paths: usize) -> PrimPaths {
-        PrimPaths { given: HashMap::with_capacity(paths) }
+        PrimPaths { given: HashSet::with_capacity(paths), ..PrimPaths::default() }
     }
 
     pub(super) fn claim(&mut self, wanted: &str) -> Arc<str> {
-        let free: Arc<str> = match self.given.get(wanted).copied() {
-            None => wanted.into(),
-            Some(mut number) => {
-                let free = loop {
-                    number += 1;
-                    let numbered = format!("{wanted}_{number}");
-                    if !self.given.contains_key(numbered.as_str()) {
-                        break numbered.into();
-                    }
-                };
-                self.given.insert(wanted.into(), number);
-                free
+        let mut free: Arc<str> = wanted.into();
+        if self.given.contains(wanted) {
+            let number = self.tried.entry(free.clone()).or_insert(1);
+            while self.given.contains(&free) {
+                *number += 1;
+                free = format!("{wanted}_{number}").into();
             }
-        };
-        self.given.insert(free.clone(), 1);
+        }
+        self.given.insert(free.clone());
         free
     }
 }

@@ -93,6 +93,7 @@ pub(super) fn features(
         _ => groups,
     });
     all.push(Feature::new("camera lenses", needs.lenses));
+    all.push(Feature::new("camera lenses over time", needs.lenses_over_time));
     all.push(Feature::new("orthographic cameras", needs.orthographic_cameras));
     all.push(Feature::new("camera shutters", needs.shutters).used_by(
         needs.animated_nodes + needs.varying_lights + needs.deforming_meshes,

@@ -85,24 +85,38 @@ impl LightGroupReport {
 pub struct CameraReport {
     /// Its prim path.
     pub path: String,
-    /// The vertical field of view of a perspective camera, degrees.
+    /// The vertical field of view of a perspective camera, degrees; that of the first frame.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub height_deg: Option<f32>,
     /// What an orthographic camera sees from bottom to top, metres.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub height_m: Option<f32>,
+    /// The same at the last frame, if it differs from that of the first: degrees or metres.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub last_height: Option<f32>,
+    /// Whether its lens, exposure or clipping planes vary with time.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub lens_varies: bool,
+    /// Whether the file hides it.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub hidden: bool,
 }
 
 impl CameraReport {
-    fn of(scene: &Scene, camera: &Camera) -> CameraReport {
-        let (height_deg, height_m) = match camera.projection {
-            Projection::Perspective { yfov_rad } => (Some(yfov_rad.to_degrees()), None),
-            Projection::Orthographic { height_m } => (None, Some(height_m)),
+    fn of(scene: &Scene, camera: &Camera, frames: &[i32]) -> CameraReport {
+        let height = |frame: i32| match scene.camera_at(camera, frame.into()).projection {
+            Projection::Perspective { yfov_rad } => yfov_rad.to_degrees(),
+            Projection::Orthographic { height_m } => height_m,
         };
+        let (first, last) = (height(frames[0]), height(frames[frames.len() - 1]));
+        let is_parallel = matches!(camera.projection, Projection::Orthographic { .. });
         CameraReport {
             path: scene.nodes[camera.node as usize].path.to_string(),
-            height_deg,
-            height_m,
+            height_deg: (!is_parallel).then_some(first),
+            height_m: is_parallel.then_some(first),
+            last_height: (last != first).then_some(last),
+            lens_varies: camera.over_time.is_some(),
+            hidden: camera.is_hidden,
         }
     }
 }
@@ -123,7 +137,7 @@ impl SceneReport {
             instances: scene.instances.len(),
             placed_triangles: scene.instances.iter().map(|i| triangles_of(i.mesh)).sum(),
             materials: scene.materials.len(),
-            cameras: scene.cameras.iter().map(|c| CameraReport::of(scene, c)).collect(),
+            cameras: scene.cameras.iter().map(|c| CameraReport::of(scene, c, &frames)).collect(),
             frames: match frames.as_slice() {
                 &[first, .., last] => Some(FrameSpan { first, last, count: frames.len() }),
                 _ => None,

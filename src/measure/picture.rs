@@ -53,7 +53,7 @@ impl<D: AsRef<[u8]>> Subject<'_, '_, D> {
         };
         let started = Instant::now();
         self.delegate.set_settings(settings);
-        let mut film = self.delegate.film()?;
+        let mut film = self.delegate.film(self.frame)?;
         let frame = self.delegate.expose(self.tree, self.frame, &mut film, control, progress)?;
         Ok(Picture {
             seconds: started.elapsed().as_secs_f64(),

@@ -76,7 +76,7 @@ impl<D: AsRef<[u8]>> Subject<'_, '_, D> {
         let started = Instant::now();
         self.delegate.prepare(self.tree, self.frame)?;
         let before = started.elapsed().as_secs_f64();
-        let mut film = self.delegate.film()?;
+        let mut film = self.delegate.film(self.frame)?;
         let mut control = ToError::new(ErrorGoal { most: goal.most.min(MOST), ..goal });
         let started = Instant::now();
         let account = Account::new(onlooker, 0.0);

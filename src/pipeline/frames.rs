@@ -12,13 +12,15 @@ pub fn frames_of(scene: &Scene) -> Vec<i32> {
             Channel::Translation(keys) | Channel::Scale(keys) => keys.times_s.last(),
             Channel::Rotation(keys) => keys.times_s.last(),
         });
-        let of_lights = scene.lights.iter().filter_map(|light| light.values.as_ref());
-        let of_meshes = scene.instances.iter().filter_map(|instance| instance.values.as_ref());
+        let of_lights = scene.lights.iter().filter_map(|light| light.values.as_deref());
+        let of_meshes = scene.instances.iter().filter_map(|instance| instance.values.as_deref());
         let values = of_lights.chain(of_meshes).map(|keys: &Keys<_>| keys.times_s.last());
         let deformations = scene.meshes.iter().filter_map(|mesh| mesh.deformation.as_ref());
         let weights = deformations.flat_map(|deformation| deformation.weights.iter());
         let values = values.chain(weights.map(|keys| keys.times_s.last()));
-        let last_s = seconds.chain(values).flatten().fold(0f32, |last, &key| last.max(key));
+        let lenses = scene.cameras.iter().filter_map(|camera| camera.over_time.as_ref()?.last_s());
+        let last_s = seconds.chain(values).flatten().copied().chain(lenses);
+        let last_s = last_s.fold(0f32, f32::max);
         f64::from(last_s)
     };
     let last_s = timeline.last_frame.map_or_else(last_key, |frame| timeline.seconds_at(frame));

@@ -1,10 +1,13 @@
 //! A camera carried from one scene into another, with the nodes that it stands at.
 
-use crate::scene::{Camera, Channel, Interpolation, Keys, Node, Scene, Shutter, Timeline};
+use crate::scene::{
+    Camera, Channel, Interpolation, Keys, LensKeys, Node, Scene, Shutter, Timeline,
+};
 use std::ops::Mul;
+use std::sync::Arc;
 
 /// Adds a camera's node and all above it to another scene, and returns the camera there. At every frame
-/// the camera is where it was in its own scene, even if the two scenes time their frames differently. The
+/// the camera is where it was in its own scene, with the lens that it had there, even if the two scenes time their frames differently. The
 /// other scene keeps its frames. The camera keeps its shutter unless lights of the other scene change, and none of
 /// that scene's cameras has the same: its trees hold where they are when its own shutters are open.
 pub fn carry_camera(from: &Scene, camera: &Camera, into: &mut Scene) -> Camera {
@@ -28,7 +31,23 @@ pub fn carry_camera(from: &Scene, camera: &Camera, into: &mut Scene) -> Camera {
     let is_known =
         |shutter: &Shutter| !into.has_lights_that_change() || into.shutters().contains(shutter);
     let shutter = camera.shutter.filter(is_known);
-    Camera { node: into.nodes.len() as u32 - 1, shutter, ..camera.clone() }
+    let retimed = |lens: &Arc<LensKeys>| match from.timeline == into.timeline {
+        true => lens.clone(),
+        false => Arc::new(retime_lens(lens, &from.timeline, &into.timeline)),
+    };
+    let over_time = camera.over_time.as_ref().map(retimed);
+    Camera { node: into.nodes.len() as u32 - 1, shutter, over_time, ..camera.clone() }
+}
+
+fn retime_lens(lens: &LensKeys, from: &Timeline, into: &Timeline) -> LensKeys {
+    let mut lens = lens.clone();
+    let LensKeys { height, lens_radius_m, focus_distance_m, film_offset, exposure_scale, clip_m } =
+        &mut lens;
+    for keys in [height, lens_radius_m, focus_distance_m, exposure_scale].into_iter().flatten() {
+        retime_keys(keys, from, into);
+    }
+    [film_offset, clip_m].into_iter().flatten().for_each(|keys| retime_keys(keys, from, into));
+    lens
 }
 
 fn retime(channel: &mut Channel, from: &Timeline, into: &Timeline) {
@@ -60,7 +79,7 @@ where
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::{Light, LightKind, Trs};
+    use crate::scene::{Light, LightKind, Projection, Trs};
     use glam::Vec3;
 
     #[test]
@@ -121,7 +140,18 @@ mod tests {
             into.nodes = vec![Node::fixed("/rig", None, Trs::default())];
             let frames = super::super::frames_of(&into);
 
-            let camera = carry_camera(&from, &Camera::perspective(2, 0.5), &mut into);
+            let number = |factor: f32| {
+                let per_key = if interpolation == Interpolation::Cubic { 3 } else { 1 };
+                let values = (0..2 * per_key).map(|i| factor * (1 + i) as f32).collect();
+                Some(Keys { times_s: vec![0.1, 2.0], values, interpolation })
+            };
+            let lens = LensKeys {
+                height: number(0.1),
+                exposure_scale: number(3.0),
+                ..LensKeys::default()
+            };
+            let zoom = Camera { over_time: Some(Arc::new(lens)), ..Camera::perspective(2, 0.5) };
+            let camera = carry_camera(&from, &zoom, &mut into);
             assert_eq!(into.nodes.len(), 3);
             assert_eq!(&*into.nodes[2].path, "cam.glb:/rig/eye");
             assert_eq!(super::super::frames_of(&into), frames, "the shot is no longer than it was");
@@ -131,6 +161,13 @@ mod tests {
                 };
                 let (was, is) = (place(&from, 2), place(&into, camera.node));
                 assert!((was - is).length() < 1e-3 * (1.0 + was.length()), "{frame}: {was} {is}");
+                let (was, is) = (from.camera_at(&zoom, frame), into.camera_at(&camera, frame));
+                let Projection::Perspective { yfov_rad: was_rad } = was.projection else {
+                    panic!()
+                };
+                let Projection::Perspective { yfov_rad } = is.projection else { panic!() };
+                assert!((was_rad - yfov_rad).abs() < 1e-4, "{frame}: {was_rad} {yfov_rad}");
+                assert!((was.exposure_scale - is.exposure_scale).abs() < 1e-3, "{frame}");
             }
         }
     }

@@ -35,7 +35,7 @@ pub struct Stamp {
     pub tree: String,
     /// The settings, for people.
     pub settings: serde_json::Value,
-    /// The camera, for people.
+    /// The camera at the frame, for people.
     pub camera: serde_json::Value,
     /// The knobs of splitting that it was rendered with.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -84,23 +84,24 @@ impl PreviewStamp {
 }
 
 /// Makes the stamps of a shot.
-pub struct Stamper {
+pub struct Stamper<'a> {
     common: blake3::Hasher,
     settings: serde_json::Value,
-    camera: serde_json::Value,
+    scene: &'a Scene,
+    camera: Camera,
 }
 
-impl Stamper {
+impl<'a> Stamper<'a> {
     /// For a scene as it was read, seen through a camera. `rest` is whatever else the pixels depend on.
     ///
     /// # Errors
     /// If this program cannot be read.
     pub fn new(
-        scene: &Scene,
+        scene: &'a Scene,
         camera: &Camera,
         (settings, effort): (&RenderSettings, &Effort),
         rest: impl fmt::Debug,
-    ) -> io::Result<Stamper> {
+    ) -> io::Result<Stamper<'a>> {
         let mut settings = serde_json::to_value(settings).map_err(io::Error::other)?;
         settings["effort"] = serde_json::to_value(effort).map_err(io::Error::other)?;
         let place = place_of(scene, camera);
@@ -110,8 +111,7 @@ impl Stamper {
         let text =
             format!("{SOFTWARE} {ALGORITHM_VERSION} {camera:?} {place:?} {rest:?} {settings}");
         common.update(text.as_bytes());
-        let camera = json!({ "path": &*place[0].path, "exposure_scale": camera.exposure_scale });
-        Ok(Stamper { common, settings, camera })
+        Ok(Stamper { common, settings, scene, camera: camera.clone() })
     }
 
     /// The fingerprint of a frame, without its tree. `plan` has the numbers of samples of its pixels, if
@@ -129,13 +129,16 @@ impl Stamper {
 
     /// The stamp of a frame, with the digest of what it samples of the tree.
     pub fn stamp(&self, frame: i32, plan: Option<&Plan>, tree: [u8; 32]) -> Stamp {
+        let Stamper { scene, camera, .. } = self;
+        let exposure_scale = scene.camera_at(camera, frame.into()).exposure_scale;
+        let path = &*scene.nodes[camera.node as usize].path;
         Stamp {
             software: SOFTWARE.into(),
             frame,
             fingerprint: self.fingerprint(frame, plan),
             tree: blake3::Hash::from(tree).to_hex().to_string(),
             settings: self.settings.clone(),
-            camera: self.camera.clone(),
+            camera: json!({ "path": path, "exposure_scale": exposure_scale }),
             knobs: None,
             noise: None,
         }

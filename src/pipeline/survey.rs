@@ -261,7 +261,7 @@ mod tests {
             lights: vec![Light {
                 node: 0,
                 kind: LightKind::Point { intensity_cd: Rgb::ONE },
-                values: Some(values),
+                values: Some(values.into()),
                 range_m: None,
                 forced: false,
                 visibility: Visibility::default(),

@@ -22,8 +22,9 @@ const FILES: [&str; 7] = [".gltf", ".glb", ".obj", ".usda", ".usdc", ".usdz", ".
 /// What to look at a scene through.
 #[derive(Args, Clone, Debug, Default, PartialEq)]
 pub struct View {
-    /// Camera to look through: a prim path or number in the scene; FILE for the first camera of another
-    /// glTF file; or FILE:CAMERA. If not given, the scene's first camera, or --fit if it has none
+    /// Camera to look through: a prim path or number in the scene; FILE for the default camera of another
+    /// glTF file; or FILE:CAMERA. If not given, the scene's camera called main_cam, or its first one that is not
+    /// hidden, or --fit if it has none
     #[arg(long)]
     pub camera: Option<String>,
     /// Put the whole scene in view, even if it has a camera
@@ -137,8 +138,8 @@ pub fn look(scene: &mut Scene, view: &View, aspect: f32) -> Result<Look, ViewErr
         }
         return own(find(scene, Some(wanted))?.clone());
     }
-    match scene.cameras.first() {
-        Some(first) if !view.fit => own(first.clone()),
+    match scene.default_camera() {
+        Some(camera) if !view.fit => own(camera.clone()),
         _ => {
             let yfov_rad = view.fov.map(|degrees| f64::from(degrees).to_radians());
             let fitted = fit::fit(scene, aspect.into(), yfov_rad);
@@ -155,11 +156,11 @@ fn by_path<'a>(scene: &'a Scene, wanted: &str) -> Option<&'a Camera> {
     scene.cameras.iter().find(|camera| &*scene.nodes[camera.node as usize].path == wanted)
 }
 
-/// The camera of some path or number; the first if none is named.
+/// The camera of some path or number; the default one if none is named.
 fn find<'a>(scene: &'a Scene, wanted: Option<&str>) -> Result<&'a Camera, ViewError> {
     let source = || scene.source.clone();
-    let first = scene.cameras.first().ok_or_else(|| ViewError::NoCamera { scene: source() })?;
-    let Some(wanted) = wanted else { return Ok(first) };
+    let default = scene.default_camera().ok_or_else(|| ViewError::NoCamera { scene: source() })?;
+    let Some(wanted) = wanted else { return Ok(default) };
     let by_number = || wanted.parse().ok().and_then(|number: usize| scene.cameras.get(number));
     by_path(scene, wanted).or_else(by_number).ok_or_else(|| ViewError::OfThatName {
         scene: source(),

@@ -7,8 +7,8 @@
 use crate::light_tree::learned::ViewKeys;
 use crate::render::surface::is_pane;
 use crate::scene::{
-    AlphaMode, Camera, Channel, Deformation, Instance, Keys, LightKind, Links, Membership, Mesh,
-    Pose, Scene, Skin,
+    AlphaMode, Camera, Channel, Deformation, Instance, Keys, LensKeys, LightKind, Links,
+    Membership, Mesh, Pose, Scene, Skin,
 };
 use blake3::Hasher;
 use bytemuck::{NoUninit, cast_slice};
@@ -21,7 +21,7 @@ pub fn view_keys(scene: &Scene, camera: &Camera) -> ViewKeys {
     let places = places(scene);
     let (infinite, geometry) =
         rayon::join(|| infinite(scene, &places), || geometry(scene, &places));
-    ViewKeys { infinite, geometry, camera: through(camera, &places) }
+    ViewKeys { infinite, geometry, camera: through(scene, camera, &places) }
 }
 
 /// Where each node is: what stands still by its place in the world, what moves by all that moves it.
@@ -178,12 +178,25 @@ fn add_deformation(hasher: &mut Hasher, deformation: &Deformation) {
     hasher.update(format!("{:?}", skeleton.joints).as_bytes());
 }
 
-fn through(camera: &Camera, places: &[Key]) -> Key {
+fn through(scene: &Scene, camera: &Camera, places: &[Key]) -> Key {
     // A picture's brightness, and the place of its node in the list, are nothing that is seen. Blur shows little
     // that the frames on both sides do not.
-    let looks = Camera { node: 0, exposure_scale: 1.0, shutter: None, ..camera.clone() };
+    let lens = camera.over_time.as_deref();
+    let lens = lens.map(|lens| LensKeys { exposure_scale: None, ..lens.clone() });
+    let lens = lens.filter(|lens| !lens.is_empty());
+    let looks = Camera {
+        node: 0,
+        exposure_scale: 1.0,
+        shutter: None,
+        over_time: None,
+        is_hidden: false,
+        ..camera.clone()
+    };
     let mut hasher = Hasher::new();
     hasher.update(format!("{looks:?}").as_bytes()).update(&places[camera.node as usize]);
+    if let Some(lens) = lens {
+        hasher.update(format!("{lens:?} {:?}", clock(scene)).as_bytes());
+    }
     finish(&hasher)
 }
 

@@ -236,14 +236,16 @@ impl<'a> RenderDelegate<'a> {
         Ok(work(&integrators))
     }
 
-    /// A film for a frame that has no samples yet.
+    /// A film for a frame that has no samples yet. It is exposed as the camera says at the frame itself, whatever the
+    /// exposure is at other times at which the shutter is open.
     ///
     /// # Errors
     /// If the settings do not fit the scene.
-    pub fn film(&self) -> Result<Film, PlanError> {
+    pub fn film(&self, frame: i32) -> Result<Film, PlanError> {
         let plan = self.plan.as_ref().map_err(Clone::clone)?;
         let size = [self.settings.width, self.settings.height];
-        Ok(Film::new(size, plan, self.camera.exposure_scale))
+        let camera = self.scene.camera_at(&self.camera, frame.into());
+        Ok(Film::new(size, plan, camera.exposure_scale))
     }
 
     /// Renders one frame, or the part of it that is to be rendered, with the same number of samples in
@@ -262,7 +264,7 @@ impl<'a> RenderDelegate<'a> {
         progress: &impl Progress,
     ) -> Result<RenderedFrame, RenderError> {
         let mut control = Uniform(self.settings.samples);
-        self.expose(tree, frame, &mut self.film()?, &mut control, progress)
+        self.expose(tree, frame, &mut self.film(frame)?, &mut control, progress)
     }
 
     /// Exposes a film further, in the passes that a control asks for, and develops it. A film that has

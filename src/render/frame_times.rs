@@ -17,7 +17,7 @@ impl FrameTimes {
     /// A frame, which may be between two whole ones, at that instant. The size is that of the picture in pixels.
     pub fn instant(scene: &Scene, camera: &Camera, frame: f64, size: [u32; 2]) -> FrameTimes {
         let pose = scene.pose_at(scene.timeline.seconds_at(frame));
-        let views = vec![CameraRays::new(camera, &pose, size)];
+        let views = vec![CameraRays::new(&scene.camera_at(camera, frame), &pose, size)];
         FrameTimes { time: frame, poses: vec![pose], views }
     }
 
@@ -35,10 +35,12 @@ impl FrameTimes {
         let time = times[times.len() / 2];
         if !is_still {
             let poses: Vec<Pose> = times.iter().map(|&at| posing.at_frame(at).clone()).collect();
-            let views = poses.iter().map(|pose| CameraRays::new(camera, pose, size)).collect();
+            let view = |(&at, pose)| CameraRays::new(&scene.camera_at(camera, at), pose, size);
+            let views = times.iter().zip(&poses).map(view).collect();
             return FrameTimes { time, poses, views };
         }
-        let view = |&at: &f64| CameraRays::new(camera, posing.at_frame(at), size);
+        let view =
+            |&at: &f64| CameraRays::new(&scene.camera_at(camera, at), posing.at_frame(at), size);
         let mut views: Vec<CameraRays> = times.iter().map(view).collect();
         if views.iter().all(|view| *view == views[0]) {
             views.truncate(1);

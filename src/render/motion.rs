@@ -1,7 +1,7 @@
 //! Motion vectors: how far what a pixel sees moves on the picture, to the next frame and from the last.
 //!
 //! In pixels, to the right and up, as Nuke's layers `forward` and `backward` have it: `forward` leads to
-//! the place in the next frame, `backward` to the place in the last one. Camera, motion and deformation at the
+//! the place in the next frame, `backward` to the place in the last one. Camera, its lens, motion and deformation at the
 //! first hit count; reflections do not. Both ends are projected through the middle of the lens, so what
 //! stands still has exactly zero. What is infinitely far turns with the camera. Beyond the shot's keys
 //! nothing moves. In a frame that is blurred, the motion is that of the middle of the time.
@@ -31,13 +31,14 @@ impl<'a> Motion<'a> {
         frame: f64,
         size: [u32; 2],
     ) -> Motion<'a> {
-        let rays = |pose: &Pose| CameraRays::new(camera, pose, size);
+        let rays =
+            |pose: &Pose, frame| CameraRays::new(&scene.camera_at(camera, frame), pose, size);
         let neighbours = [1.0, -1.0].map(|step| {
             let pose = scene.pose_at(scene.timeline.seconds_at(frame + step));
-            let rays = rays(&pose);
+            let rays = rays(&pose, frame + step);
             (pose, rays)
         });
-        Motion { scene, pose, camera: rays(pose), neighbours }
+        Motion { scene, pose, camera: rays(pose, frame), neighbours }
     }
 
     /// `forward` and `backward` of what a path has hit first in a pose of the frame. Zero where a neighbour does not

@@ -1,8 +1,11 @@
 //! Cameras.
 
-use super::Shutter;
+use super::{LensKeys, Shutter};
+use std::sync::Arc;
 
 /// A camera that looks along its node's -Z with +Y up (glTF's convention, and USD's).
+///
+/// Where [`over_time`](Camera::over_time) says otherwise, [`Scene::camera_at`](super::Scene::camera_at) tells what it is.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Camera {
     /// The node it stands at.
@@ -26,6 +29,10 @@ pub struct Camera {
     pub clip_m: [f32; 2],
     /// When its shutter is open; `None` for an instant.
     pub shutter: Option<Shutter>,
+    /// How its lens varies, if it does.
+    pub over_time: Option<Arc<LensKeys>>,
+    /// Whether the file hides it: it is looked through if it is named, or if there is no other.
+    pub is_hidden: bool,
 }
 
 /// How points of the scene come to the film.
@@ -56,6 +63,8 @@ impl Camera {
             exposure_scale: 1.0,
             clip_m: [0.0, f32::INFINITY],
             shutter: None,
+            over_time: None,
+            is_hidden: false,
         }
     }
 

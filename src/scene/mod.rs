@@ -27,6 +27,7 @@
 mod camera;
 mod deformation;
 mod ies_profile;
+mod lens;
 mod light;
 mod linking;
 mod material;
@@ -47,6 +48,7 @@ mod visibility;
 pub use camera::{Camera, Projection};
 pub use deformation::{Deformation, FARTHEST_M, Shape, Skeleton, Skin, Target, is_near};
 pub use ies_profile::{IesProfile, IesTable, LitCone, Pole};
+pub use lens::LensKeys;
 pub use light::{Light, LightKind, Shaping};
 pub use linking::{LinkRows, Linking, Links, Membership};
 pub use material::{AlphaMode, Coat, Material, Transmission, Volume};
@@ -66,6 +68,9 @@ use crate::math::built_in;
 use glam::DVec3;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
+
+/// USD's name of a stage's primary camera (`UsdUtilsGetPrimaryCameraName`).
+const MAIN_CAMERA: &str = "main_cam";
 
 /// Everything ingest found, by index. See the [module page](self).
 #[derive(Debug, Default)]
@@ -109,7 +114,7 @@ pub struct Scene {
 impl Scene {
     /// Where everything is and how strong it shines at `time_s` seconds on the file's clock.
     pub fn pose_at(&self, time_s: f64) -> Pose {
-        Pose::evaluate(self, time_s).0
+        Pose::evaluate(self, time_s)
     }
 
     /// Whether two poses differ in nothing but from where the scene is seen, and in lights at infinity.
@@ -127,14 +132,15 @@ impl Scene {
     /// Whether any light but those at infinity moves, varies in strength or changes its shape.
     pub fn has_lights_that_change(&self) -> bool {
         let moving = self.moving_nodes();
-        let changes = |node: u32, values: &Option<Keys<_>>| {
-            moving[node as usize] || values.as_ref().is_some_and(Keys::varies)
+        let changes = |node: u32, values: Option<&Keys<_>>| {
+            moving[node as usize] || values.is_some_and(Keys::varies)
         };
         let shines = |row: &usize| self.peak_rgb_of_instance(*row as u32).max_element() > 0.0;
         let mut meshes = (0..self.instances.len()).filter(shines).map(|row| &self.instances[row]);
         let mut lights = self.lights.iter().filter(|light| !light.kind.is_infinite());
-        meshes.any(|mesh| changes(mesh.node, &mesh.values) || self.changes_shape(mesh.mesh))
-            || lights.any(|light| changes(light.node, &light.values))
+        meshes
+            .any(|mesh| changes(mesh.node, mesh.values.as_deref()) || self.changes_shape(mesh.mesh))
+            || lights.any(|light| changes(light.node, light.values.as_deref()))
     }
 
     /// For each node, whether it moves with time.
@@ -173,6 +179,22 @@ impl Scene {
     /// The prim path of a light.
     pub fn light_path(&self, light: usize) -> &str {
         &self.nodes[self.lights[light].node as usize].path
+    }
+
+    /// The camera that is looked through if none is named: one called `main_cam`, as in `usdrecord`, or else the
+    /// first. One that the file hides is looked through only if it hides all.
+    pub fn default_camera(&self) -> Option<&Camera> {
+        let is_main = |camera: &&Camera| {
+            let path = &self.nodes[camera.node as usize].path;
+            path.rsplit('/').next() == Some(MAIN_CAMERA)
+        };
+        let choose = |is_hidden: bool| {
+            let mut of_these =
+                self.cameras.iter().filter(move |camera| camera.is_hidden == is_hidden);
+            let first = of_these.clone().next();
+            of_these.find(is_main).or(first)
+        };
+        choose(false).or_else(|| choose(true))
     }
 
     /// Which features of the renderer and the tree this scene switches on.

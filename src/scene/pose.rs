@@ -6,7 +6,9 @@ use super::deformation::{Shape, Shapes};
 use super::{Scene, Timeline};
 use crate::math::built_in;
 use crate::math::color::Rgb;
-use glam::{Affine3A, DAffine3, DQuat, DVec3, Quat, Vec3};
+use glam::{Affine3A, DAffine3, DQuat, DVec2, DVec3, Quat, Vec2, Vec3};
+use std::iter::Sum;
+use std::ops::Mul;
 use std::sync::Arc;
 
 /// A place in the transform hierarchy.
@@ -92,23 +94,38 @@ impl Default for Trs {
 }
 
 impl Pose {
-    /// Composes the hierarchy in double precision, so that only the result is rounded. Returns the
-    /// unrounded transforms too.
-    pub(super) fn evaluate(scene: &Scene, time_s: f64) -> (Pose, Vec<DAffine3>) {
+    /// Composes the hierarchy in double precision, so that only the result is rounded.
+    pub(super) fn evaluate(scene: &Scene, time_s: f64) -> Pose {
         let at = Instant { time_s, timeline: scene.timeline };
-        let mut exact: Vec<DAffine3> = Vec::with_capacity(scene.nodes.len());
-        for node in &scene.nodes {
-            exact.push(node.in_world(scene.origin, &exact, at));
+        // Of millions of nodes few are parents: only theirs are kept, and where each is.
+        let mut exact: Vec<DAffine3> = Vec::new();
+        let mut kept = vec![u32::MAX; scene.nodes.len()];
+        for parent in scene.nodes.iter().filter_map(|node| node.parent) {
+            kept[parent as usize] = 0;
         }
-        let lights = scene.lights.iter().map(|light| light.values.as_ref());
-        let instances = scene.instances.iter().map(|instance| instance.values.as_ref());
-        let pose = Pose {
-            world: exact.iter().map(DAffine3::as_affine3a).collect(),
+        let world = scene.nodes.iter().enumerate().map(|(row, node)| {
+            let above = node.parent.map(|parent| &exact[kept[parent as usize] as usize]);
+            let transform = node.in_world(scene.origin, above, at);
+            if kept[row] == 0 {
+                kept[row] = exact.len() as u32;
+                exact.push(transform);
+            }
+            transform.as_affine3a()
+        });
+        let world = world.collect();
+        Pose::with(scene, world, at)
+    }
+
+    /// Given the transforms of all nodes.
+    pub(super) fn with(scene: &Scene, world: Vec<Affine3A>, at: Instant) -> Pose {
+        let lights = scene.lights.iter().map(|light| light.values.as_deref());
+        let instances = scene.instances.iter().map(|instance| instance.values.as_deref());
+        Pose {
+            world,
             light_rgb: values_at(lights, at),
             instance_rgb: values_at(instances, at),
-            shapes: Shapes::at(scene, time_s),
-        };
-        (pose, exact)
+            shapes: Shapes::at(scene, at.time_s),
+        }
     }
 
     /// The world-space radius of a sphere of some local radius at a node, metres. It grows with the
@@ -162,7 +179,7 @@ fn values_at<'a>(
     if rows.clone().all(|keys| keys.is_none()) {
         return Vec::new();
     }
-    rows.map(|keys| Some(keys?.vector_at(at).as_vec3())).collect()
+    rows.map(|keys| Some(keys?.blend_at(at).as_vec3())).collect()
 }
 
 /// Which nodes move: those with channels, and all below them.
@@ -228,11 +245,16 @@ impl Node {
         self.local_at(Instant { time_s, timeline })
     }
 
-    /// Local to world at a time, seen from an origin, given that of all nodes before.
-    pub(super) fn in_world(&self, origin: DVec3, before: &[DAffine3], at: Instant) -> DAffine3 {
+    /// Local to world at a time, seen from an origin, given that of its parent.
+    pub(super) fn in_world(
+        &self,
+        origin: DVec3,
+        parent: Option<&DAffine3>,
+        at: Instant,
+    ) -> DAffine3 {
         let local = self.local_at(at);
-        match self.parent {
-            Some(parent) => before[parent as usize] * local,
+        match parent {
+            Some(parent) => *parent * local,
             None => DAffine3 { translation: local.translation - origin, ..local },
         }
     }
@@ -245,8 +267,8 @@ impl Node {
         };
         for channel in &self.channels {
             match channel {
-                Channel::Translation(keys) => translation = keys.vector_at(at),
-                Channel::Scale(keys) => scale = keys.vector_at(at),
+                Channel::Translation(keys) => translation = keys.blend_at(at),
+                Channel::Scale(keys) => scale = keys.blend_at(at),
                 Channel::Rotation(keys) => rotation = keys.rotation_at(at),
             }
         }
@@ -310,7 +332,7 @@ impl<T: Copy> Keys<T> {
 impl Keys<Vec3> {
     /// The value at a time, seconds on the clock of a timeline.
     pub fn at(&self, time_s: f64, timeline: Timeline) -> DVec3 {
-        self.vector_at(Instant { time_s, timeline })
+        self.blend_at(Instant { time_s, timeline })
     }
 
     /// The largest of each component over all keys: what values that are no spline never exceed.
@@ -328,19 +350,65 @@ impl Keys<Vec3> {
             && (self.values.iter().all(|value| value.cmpgt(above).all())
                 || self.values.iter().all(|value| value.cmplt(below).all()))
     }
+}
 
-    pub(super) fn vector_at(&self, at: Instant) -> DVec3 {
+/// What is blended component by component between keys.
+pub trait Blend: Copy {
+    /// The same in double precision.
+    type Exact: Mul<f64, Output = Self::Exact> + Sum;
+
+    fn exact(self) -> Self::Exact;
+    fn lerp(from: Self::Exact, to: Self::Exact, share: f64) -> Self::Exact;
+}
+
+impl Blend for f32 {
+    type Exact = f64;
+
+    fn exact(self) -> f64 {
+        self.into()
+    }
+
+    fn lerp(from: f64, to: f64, share: f64) -> f64 {
+        from * (1.0 - share) + to * share
+    }
+}
+
+impl Blend for Vec2 {
+    type Exact = DVec2;
+
+    fn exact(self) -> DVec2 {
+        self.as_dvec2()
+    }
+
+    fn lerp(from: DVec2, to: DVec2, share: f64) -> DVec2 {
+        from.lerp(to, share)
+    }
+}
+
+impl Blend for Vec3 {
+    type Exact = DVec3;
+
+    fn exact(self) -> DVec3 {
+        self.as_dvec3()
+    }
+
+    fn lerp(from: DVec3, to: DVec3, share: f64) -> DVec3 {
+        from.lerp(to, share)
+    }
+}
+
+impl<T: Blend> Keys<T> {
+    pub(super) fn blend_at(&self, at: Instant) -> T::Exact {
         let at = self.find(at);
         match self.interpolation {
             Interpolation::Linear => {
-                let (a, b) = (self.values[at.before].as_dvec3(), self.values[at.after].as_dvec3());
-                a.lerp(b, at.fraction)
+                T::lerp(self.values[at.before].exact(), self.values[at.after].exact(), at.fraction)
             }
-            Interpolation::Step => self.values[at.before].as_dvec3(),
+            Interpolation::Step => self.values[at.before].exact(),
             Interpolation::Cubic => {
                 let weights = Self::hermite(&at);
                 let values = self.hermite_values(&at);
-                (0..4).map(|i| values[i].as_dvec3() * weights[i]).sum()
+                (0..4).map(|i| values[i].exact() * weights[i]).sum()
             }
         }
     }

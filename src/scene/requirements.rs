@@ -62,6 +62,8 @@ pub struct Requirements {
     pub deforming_meshes: usize,
     /// Cameras with a lens.
     pub lenses: usize,
+    /// Cameras whose lens, exposure or clipping planes vary with time.
+    pub lenses_over_time: usize,
     /// Orthographic cameras.
     pub orthographic_cameras: usize,
     /// Cameras with a shutter.
@@ -79,7 +81,7 @@ impl Requirements {
             {
                 needs.mesh_lights += 1;
                 needs.varying_lights +=
-                    usize::from(instance.values.as_ref().is_some_and(Keys::varies));
+                    usize::from(instance.values.as_deref().is_some_and(Keys::varies));
                 needs.textured_mesh_lights += usize::from(material.emission_texture.is_some());
                 needs.shaped_lights += usize::from(instance.shaping.is_some());
                 needs.photometric_lights += usize::from(is_photometric(instance.shaping));
@@ -97,7 +99,7 @@ impl Requirements {
         }
         needs.shared_meshes = uses.iter().filter(|&&count| count > 1).count();
         for light in &scene.lights {
-            needs.varying_lights += usize::from(light.values.as_ref().is_some_and(Keys::varies));
+            needs.varying_lights += usize::from(light.values.as_deref().is_some_and(Keys::varies));
             needs.ranges += usize::from(light.range_m.is_some());
             needs.forced += usize::from(light.forced);
             match light.kind {
@@ -135,7 +137,8 @@ impl Requirements {
         needs.glossy += usize::from(scene.meshes.iter().any(|mesh| mesh.material.is_none()));
         needs.deforming_meshes = scene.meshes.iter().filter(|m| m.deformation.is_some()).count();
         needs.fog = usize::from(scene.medium.is_some());
-        needs.lenses = scene.cameras.iter().filter(|c| c.lens_radius_m > 0.0).count();
+        needs.lenses = scene.cameras.iter().filter(|c| c.has_lens()).count();
+        needs.lenses_over_time = scene.cameras.iter().filter(|c| c.over_time.is_some()).count();
         let is_parallel = |c: &&Camera| matches!(c.projection, Projection::Orthographic { .. });
         needs.orthographic_cameras = scene.cameras.iter().filter(is_parallel).count();
         needs.shutters = scene.cameras.iter().filter(|c| c.shutter.is_some()).count();

@@ -6,7 +6,7 @@
 
 use super::pose::{Channel, Interpolation, Keys, Node, Trs};
 use crate::math::color::Rgb;
-use glam::{Quat, Vec3};
+use glam::{Quat, Vec2, Vec3};
 
 /// How far keys of one scale or one direction may be apart, relative or in radians: a few dozen
 /// roundings of 32-bit numbers, as decomposing matrices leaves them.
@@ -95,6 +95,29 @@ impl Keys<Rgb> {
     }
 }
 
+impl Keys<f32> {
+    /// The number that holds at all times, if one does.
+    pub fn steady_number(&self) -> Option<f32> {
+        let largest = self.values.iter().fold(0f32, |largest, value| largest.max(value.abs()));
+        let near = |difference: f64| difference.abs() <= STRENGTH_NOISE * f64::from(largest);
+        let is_near = |a: f32, b: f32| near(f64::from(a) - f64::from(b));
+        self.steady(is_near, |tangent, step_s| near(f64::from(tangent) * step_s))
+    }
+}
+
+impl Keys<Vec2> {
+    /// The pair of numbers that holds at all times, if one does.
+    pub fn steady_pair(&self) -> Option<Vec2> {
+        let part = |which: fn(Vec2) -> f32| Keys {
+            times_s: self.times_s.clone(),
+            values: self.values.iter().map(|&pair| which(pair)).collect(),
+            interpolation: self.interpolation,
+        };
+        let x = part(|pair| pair.x).steady_number()?;
+        Some(Vec2::new(x, part(|pair| pair.y).steady_number()?))
+    }
+}
+
 impl<T> Keys<T> {
     /// Whether there is more than one key.
     pub fn varies(&self) -> bool {
@@ -105,6 +128,9 @@ impl<T> Keys<T> {
 impl Node {
     /// Puts what channels say at all times in the place of the channels.
     pub fn settle(&mut self) {
+        if self.channels.is_empty() {
+            return;
+        }
         let Trs::Parts { translation, rotation, scale } = &mut self.local else { return };
         // A later channel of the same part would override what is settled: it stays, and so do both.
         let kinds: Vec<_> = self.channels.iter().map(std::mem::discriminant).collect();

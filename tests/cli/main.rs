@@ -9,6 +9,7 @@ mod files;
 mod inspect;
 mod layers;
 mod learned;
+mod lenses;
 mod lies;
 mod lights;
 mod links;

@@ -8,6 +8,7 @@ mod files;
 mod fog;
 mod glass;
 mod gltf;
+mod lenses;
 mod links;
 mod malformed;
 mod mended;

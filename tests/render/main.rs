@@ -17,6 +17,7 @@ mod knobs;
 mod layers;
 mod learned;
 mod lens;
+mod lenses;
 mod linking;
 mod moving;
 mod noise;

@@ -29,7 +29,7 @@ impl Studio<'_> {
 
     fn expose(&self, seed: u32, control: &mut dyn Control) -> (Film, RenderedFrame) {
         let delegate = self.delegate(seed);
-        let mut film = delegate.film().unwrap();
+        let mut film = delegate.film(1).unwrap();
         let frame = delegate.expose(&self.set.tree, 1, &mut film, control, &()).unwrap();
         (film, frame)
     }
@@ -305,7 +305,7 @@ fn a_frame_that_is_gone_on_with_is_the_one_that_was_never_stopped() {
     let (film, whole, _) = studio.to_error(5, goal);
     for patience in [1, 7, 40] {
         let delegate = studio.delegate(5);
-        let mut kept = delegate.film().unwrap();
+        let mut kept = delegate.film(1).unwrap();
         let mut stops = 0;
         let frame = loop {
             let progress = Impatient { left: AtomicU64::new(patience) };
@@ -314,9 +314,9 @@ fn a_frame_that_is_gone_on_with_is_the_one_that_was_never_stopped() {
             let mut bytes = Vec::new();
             kept.save(&mut bytes).unwrap();
             for end in [0, 1, bytes.len() / 2, bytes.len() - 1] {
-                assert!(delegate.film().unwrap().restored(&bytes[..end]).is_none());
+                assert!(delegate.film(1).unwrap().restored(&bytes[..end]).is_none());
             }
-            kept = delegate.film().unwrap().restored(&bytes).unwrap();
+            kept = delegate.film(1).unwrap().restored(&bytes).unwrap();
             match done {
                 Ok(frame) => break frame,
                 Err(error) => assert!(matches!(error, RenderError::Stopped), "{error}"),

@@ -22,7 +22,7 @@ fn samples_that_are_not_finite_are_left_out_counted_and_located() {
     let set = stage.set();
     let camera = stage.scene.cameras[0].clone();
     let delegate = RenderDelegate::new(&stage.scene, &set.emitters, camera, settings.clone());
-    let mut film = delegate.film().unwrap();
+    let mut film = delegate.film(1).unwrap();
     let frame = delegate.expose(&set.tree, 1, &mut film, &mut Uniform(4), &()).unwrap();
     let FrameStats { non_finite, first_non_finite, .. } = frame.stats;
     let left_out: Vec<u32> =

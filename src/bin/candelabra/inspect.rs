@@ -134,12 +134,19 @@ fn print_scene(out: &mut impl Write, report: &SceneReport) -> Result<()> {
     writeln!(out, "  materials   {}", report.materials)?;
     for (i, camera) in report.cameras.iter().enumerate() {
         let height = match (camera.height_deg, camera.height_m) {
-            (Some(degrees), _) => format!("{degrees:.1} degrees high"),
+            (Some(degrees), _) => {
+                let last = camera.last_height.map(|last| format!(" to {last:.1}"));
+                format!("{degrees:.1}{} degrees high", last.unwrap_or_default())
+            }
             (None, metres) => {
-                format!("orthographic, {} m high", Short(metres.unwrap_or(0.0).into()))
+                let last = camera.last_height.map(|last| format!(" to {}", Short(last.into())));
+                let (first, last) = (Short(metres.unwrap_or(0.0).into()), last.unwrap_or_default());
+                format!("orthographic, {first}{last} m high")
             }
         };
-        writeln!(out, "  camera {i}    {}, {height}", camera.path)?;
+        let varies = if camera.lens_varies { ", its lens varies" } else { "" };
+        let hidden = if camera.hidden { ", hidden" } else { "" };
+        writeln!(out, "  camera {i}    {}, {height}{varies}{hidden}", camera.path)?;
     }
     if let Some(frames) = report.frames {
         let rate = report.frames_per_second;

@@ -3,16 +3,18 @@
 //! A channel that cannot be read is left out; one whose keys are only partly good keeps those.
 
 use super::accessors::Accessor;
-use super::document::{Node, Target, label};
+use super::document::{Document, Node, Target, label};
+use super::lenses::{self, YFOV, YMAG};
 use super::posing::Weights;
 use super::{Output, Source};
 use crate::ingest::error::Fault;
-use crate::scene::{Category, Channel, Interpolation, Keys};
+use crate::scene::{Category, Channel, Interpolation, Keys, LensKeys};
 use glam::{Quat, Vec3};
 use gltf::json::accessor::{ComponentType, Type};
 use gltf::json::animation::{Interpolation as RowInterpolation, Sampler};
 use gltf::json::validation::Checked;
 use std::collections::{BTreeMap, HashSet};
+use std::sync::Arc;
 
 /// How far the length of a key's quaternion may be from one without a note; small integers are coarse.
 const QUATERNION_TOLERANCE: f32 = 0.03;
@@ -20,12 +22,24 @@ const QUATERNION_TOLERANCE: f32 = 0.03;
 /// The path of a channel that animates morph targets.
 const WEIGHTS: &str = "weights";
 
-/// What animations say of the nodes of a file.
+/// The channels of nodes, by their numbers in the file.
+pub(super) type Channels = BTreeMap<usize, Vec<Channel>>;
+
+/// What animations say of the nodes and cameras of a file.
 pub(super) struct Animated {
-    /// The channels of every node.
-    pub channels: Vec<Vec<Channel>>,
+    /// The channels of the nodes that have any.
+    pub channels: Channels,
     /// Of the nodes whose weights of morph targets are animated.
     pub weights: BTreeMap<usize, Weights>,
+    /// Of the cameras whose height is animated.
+    pub lenses: BTreeMap<usize, Arc<LensKeys>>,
+}
+
+/// What a channel animates a part of, by its number in the file.
+#[derive(Clone, Copy, PartialEq, Eq, Hash)]
+enum Moved {
+    Node(usize),
+    Camera(usize),
 }
 
 /// The keys of a sampler that can be read.
@@ -40,31 +54,33 @@ pub(super) struct Track {
     mended: Option<&'static str>,
 }
 
-/// The channels and weights of every node of the file.
+/// The channels and weights of every node of the file, and the heights of its cameras.
 pub(super) fn compile(source: &Source, output: &mut Output) -> Result<Animated, Fault> {
     let document = source.document;
     let timeline = output.scene.timeline;
-    let mut channels: Vec<Vec<Channel>> = document.nodes.iter().map(|_| Vec::new()).collect();
-    let mut weights = BTreeMap::new();
+    let mut channels = Channels::new();
+    let (mut weights, mut lenses) = (BTreeMap::new(), BTreeMap::new());
     let mut moved = HashSet::new();
     for (i, animation) in document.animations.iter().enumerate() {
         let object = label("animation", i, animation.name.as_deref());
         for row in &document.beside.channels[i] {
-            let Some((node, path)) = target(&row.target) else {
+            let Some((moves, path)) = target(&row.target) else {
                 let (what, category, text) = unread(&row.target);
                 output.notes.add(category, format!("{object}, {what}"), text);
                 continue;
             };
-            let can = |node: &Node| path == WEIGHTS || node.transform.matrix.is_none();
-            if !document.nodes.get(node).is_some_and(can) {
+            if !can_move(document, moves, path) {
                 let text = "moves nothing that could move; left out";
                 output.notes.add(Category::Animation, &*object, text);
                 continue;
             }
-            if moved.contains(&(node, path)) {
-                let node = label("node", node, None);
+            if moved.contains(&(moves, path)) {
+                let what = match moves {
+                    Moved::Node(node) => label("node", node, None),
+                    Moved::Camera(camera) => label("camera", camera, None),
+                };
                 let text = format!("only the first animation of its {path} is read");
-                output.notes.add(Category::Animation, node, text);
+                output.notes.add(moves.category(), what, text);
                 continue;
             }
             let sampler = animation.samplers.get(row.sampler.value());
@@ -83,24 +99,61 @@ pub(super) fn compile(source: &Source, output: &mut Output) -> Result<Animated, 
             };
             match compiled {
                 Ok((mut track, values)) => {
-                    moved.insert((node, path));
-                    if path == WEIGHTS {
-                        weights.insert(node, Weights::of(&track, values, timeline));
-                    } else {
-                        channels[node].push(channel(path, &mut track, values));
+                    match moves {
+                        Moved::Camera(camera) => match lenses::height(path, &track, values) {
+                            Ok(lens) => _ = lenses.insert(camera, lens),
+                            Err(problem) => {
+                                let text = format!("{problem}; this animation is left out");
+                                output.notes.add(moves.category(), &*object, text);
+                                continue;
+                            }
+                        },
+                        Moved::Node(node) if path == WEIGHTS => {
+                            weights.insert(node, Weights::of(&track, values, timeline));
+                        }
+                        Moved::Node(node) => {
+                            let own = channel(path, &mut track, values);
+                            channels.entry(node).or_default().push(own);
+                        }
                     }
+                    moved.insert((moves, path));
                     if let Some(text) = track.mended {
-                        output.notes.add(Category::Animation, &*object, text);
+                        output.notes.add(moves.category(), &*object, text);
                     }
                 }
                 Err(problem) => {
                     let text = format!("{problem}; this animation of a {path} is left out");
-                    output.notes.add(Category::Animation, &*object, text);
+                    output.notes.add(moves.category(), &*object, text);
                 }
             }
         }
     }
-    Ok(Animated { channels, weights })
+    Ok(Animated { channels, weights, lenses })
+}
+
+impl Moved {
+    fn category(self) -> Category {
+        match self {
+            Moved::Node(_) => Category::Animation,
+            Moved::Camera(_) => Category::Cameras,
+        }
+    }
+}
+
+/// Whether the file has such a part.
+fn can_move(document: &Document, moves: Moved, path: &str) -> bool {
+    match moves {
+        Moved::Node(node) => {
+            let can = |node: &Node| path == WEIGHTS || node.transform.matrix.is_none();
+            document.nodes.get(node).is_some_and(can)
+        }
+        Moved::Camera(camera) if path == YFOV => {
+            document.cameras.get(camera).is_some_and(|camera| camera.perspective.is_some())
+        }
+        Moved::Camera(camera) => {
+            document.beside.magnifications.get(camera).is_some_and(Option::is_some)
+        }
+    }
 }
 
 /// How many bytes the keys of a channel take.
@@ -114,16 +167,22 @@ pub(super) fn byte_length(channel: &Channel) -> u64 {
     }
 }
 
-/// The node and what of it a channel moves, directly or by a pointer.
-fn target(target: &Target) -> Option<(usize, &'static str)> {
+/// What a channel moves and which part of it, directly or by a pointer.
+fn target(target: &Target) -> Option<(Moved, &'static str)> {
     let parts = ["translation", "rotation", "scale", WEIGHTS];
     let part = |name: &str| parts.into_iter().find(|part| *part == name);
     match &target.extensions.pointer {
         Some(pointer) => {
-            let (node, path) = pointer.pointer.strip_prefix("/nodes/")?.split_once('/')?;
-            Some((node.parse().ok()?, part(path)?))
+            let pointer = pointer.pointer.as_str();
+            if let Some(camera) = pointer.strip_prefix("/cameras/") {
+                let (camera, path) = camera.split_once('/')?;
+                let path = [YFOV, YMAG].into_iter().find(|part| *part == path)?;
+                return Some((Moved::Camera(camera.parse().ok()?), path));
+            }
+            let (node, path) = pointer.strip_prefix("/nodes/")?.split_once('/')?;
+            Some((Moved::Node(node.parse().ok()?), part(path)?))
         }
-        None => Some((target.node?.value(), part(&target.path)?)),
+        None => Some((Moved::Node(target.node?.value()), part(&target.path)?)),
     }
 }
 
@@ -139,7 +198,7 @@ fn unread(target: &Target) -> (&str, Category, &'static str) {
             (Category::Lights, "animation of emission is not read; the light is constant")
         }
         Some("materials") => (Category::Materials, "animation of materials is not read"),
-        Some("cameras") => (Category::Cameras, "animation of lenses is not read"),
+        Some("cameras") => (Category::Cameras, "animation of this part of a lens is not read"),
         Some("extensions") if pointer.contains("KHR_lights_punctual") => {
             (Category::Lights, "animation of light is not read; the light is constant")
         }
@@ -168,7 +227,7 @@ fn track(
     let in_a_key = if interpolation == Interpolation::Cubic { 3 } else { 1 };
     let shape = match path {
         "rotation" => Type::Vec4,
-        WEIGHTS => Type::Scalar,
+        WEIGHTS | YFOV | YMAG => Type::Scalar,
         _ => Type::Vec3,
     };
     let typed = values.component == ComponentType::F32 || values.normalized;

@@ -4,31 +4,33 @@
 //! that makes no sense is mended and noted, and a camera that shows nothing is left out and noted.
 
 use super::document::{Node, UsdCamera, reals};
-use super::{Output, Source};
+use super::{Output, Source, lenses};
+use crate::ingest::error::Fault;
 use crate::ingest::notes::Notes;
-use crate::scene::{Camera, Category, Projection, Shutter};
+use crate::scene::{Camera, Category, LensKeys, Projection, Shutter};
 use gltf::json::{Camera as Row, Index};
 use std::f32::consts::PI;
+use std::sync::Arc;
 
 /// The field of view that is taken where the file's is none, degrees.
 const DEFAULT_YFOV_DEG: f32 = 45.0;
 
 const CAMERAS: Category = Category::Cameras;
 
-/// Adds the camera of a node.
+/// Adds the camera of a node. `animated` is what the file's animations say of it.
 pub(super) fn compile(
     source: &Source,
     output: &mut Output,
-    camera: Index<Row>,
+    (camera, animated): (Index<Row>, Option<&Arc<LensKeys>>),
     row: &Node,
-    node: u32,
+    (node, is_hidden): (u32, bool),
     object: &str,
-) {
+) -> Result<(), Fault> {
     let document = source.document;
     let notes = &mut output.notes;
     let Some(lens) = document.get(camera) else {
         notes.add(CAMERAS, object, "its camera is not in the file; left out");
-        return;
+        return Ok(());
     };
     let is_sound = |aspect: &f32| *aspect > 0.0 && aspect.is_finite();
     let mut compiled = if let Some(lens) = &lens.perspective {
@@ -48,16 +50,21 @@ pub(super) fn compile(
                 object,
                 "its orthographic camera sees no width or no height; left out",
             );
-            return;
+            return Ok(());
         }
         let aspect = Some(xmag / ymag).filter(is_sound);
         Camera { aspect, ..Camera::orthographic(node, height_m) }
     } else {
         notes.add(CAMERAS, object, "its camera has no projection; left out");
-        return;
+        return Ok(());
     };
+    compiled.is_hidden = is_hidden;
+    animate(&mut compiled, animated);
     match UsdCamera::of(&row.extras, object) {
-        Ok(Some(usd)) => apply(&usd, &mut compiled, object, notes),
+        Ok(Some(usd)) => {
+            apply(&usd, &mut compiled, object, notes);
+            lenses::apply(&usd, &mut compiled, object, output)?;
+        }
         Ok(None) => {}
         Err(fault) => {
             notes.add(
@@ -68,13 +75,23 @@ pub(super) fn compile(
         }
     }
     output.scene.cameras.push(compiled);
+    Ok(())
+}
+
+/// Gives a camera what animations say of its height.
+fn animate(camera: &mut Camera, animated: Option<&Arc<LensKeys>>) {
+    let Some(lens) = animated else { return };
+    let still = lens.height.as_ref().filter(|keys| !keys.varies()).map(|keys| keys.values[0]);
+    match (still, &mut camera.projection) {
+        (None, _) => camera.over_time = Some(lens.clone()),
+        (Some(height), Projection::Perspective { yfov_rad }) => *yfov_rad = height,
+        (Some(height), Projection::Orthographic { height_m }) => *height_m = height,
+    }
 }
 
 /// A full vertical field of view in (0, pi), radians.
 fn field_of_view(yfov: f32, object: &str, notes: &mut Notes) -> f32 {
-    // The largest whose half has a tangent that is still positive.
-    let widest = PI - 1e-6;
-    if yfov > 0.0 && yfov < widest {
+    if is_field_of_view(yfov) {
         return yfov;
     }
     let problem = format!(
@@ -85,32 +102,31 @@ fn field_of_view(yfov: f32, object: &str, notes: &mut Notes) -> f32 {
     DEFAULT_YFOV_DEG.to_radians()
 }
 
-/// What USD says of a camera and glTF does not.
+/// Whether half of it has a tangent that is positive.
+pub(super) fn is_field_of_view(yfov: f32) -> bool {
+    yfov > 0.0 && yfov < PI - 1e-6
+}
+
+/// What USD says of a camera and glTF does not, where it does not vary.
 fn apply(usd: &UsdCamera, camera: &mut Camera, object: &str, notes: &mut Notes) {
-    let (f_stop, focal_length) = (usd.f_stop.f32(), usd.focal_length_m.f32());
-    let focus_distance = usd.focus_distance_m.f32();
+    let [f_stop, focal_length, focus] =
+        reals([usd.f_stop, usd.focal_length_m, usd.focus_distance_m]);
+    camera.is_hidden |= usd.hidden;
     camera.film_offset = reals(usd.film_offset);
-    // A lens that is focused nowhere blurs everything: USD means a pinhole.
     if f_stop > 0.0 && matches!(camera.projection, Projection::Orthographic { .. }) {
         notes.add(
             CAMERAS,
             object,
             "its camera is orthographic and has no lens; its f-stop is left out",
         );
-    } else if f_stop > 0.0 && focus_distance > 0.0 {
-        let radius = focal_length / (2.0 * f_stop);
-        if radius >= 0.0 && radius.is_finite() {
-            camera.lens_radius_m = radius;
-            camera.focus_distance_m = focus_distance;
-        } else {
-            notes.add(
-                CAMERAS,
-                object,
-                "its camera's lens has no possible radius; taken for a pinhole",
-            );
+    } else {
+        match lens_radius(f_stop, focal_length, focus) {
+            Ok(Some(radius)) => (camera.lens_radius_m, camera.focus_distance_m) = (radius, focus),
+            Ok(None) => {}
+            Err(problem) => {
+                notes.add(CAMERAS, object, format!("its camera's {problem}; taken for a pinhole"));
+            }
         }
-    } else if f_stop < 0.0 || focus_distance < 0.0 {
-        notes.add(CAMERAS, object, "its camera's f-stop or focus is negative; taken for a pinhole");
     }
     if let Some(scale) = usd.exposure_scale.map(|scale| scale.f32()) {
         if scale >= 0.0 {
@@ -136,4 +152,25 @@ fn apply(usd: &UsdCamera, camera: &mut Camera, object: &str, notes: &mut Notes) 
             notes.add(CAMERAS, object, "its camera's shutter is never open; taken for an instant");
         }
     }
+}
+
+/// The radius of a lens, metres; `None` is a pinhole. A lens that is focused nowhere blurs everything: USD means a
+/// pinhole.
+///
+/// # Errors
+/// What makes no sense.
+pub(super) fn lens_radius(
+    f_stop: f32,
+    focal_length_m: f32,
+    focus_distance_m: f32,
+) -> Result<Option<f32>, &'static str> {
+    if f_stop < 0.0 || focus_distance_m < 0.0 {
+        return Err("f-stop or focus is negative");
+    }
+    if f_stop == 0.0 || focus_distance_m == 0.0 {
+        return Ok(None);
+    }
+    let radius = focal_length_m / (2.0 * f_stop);
+    let is_possible = radius >= 0.0 && radius.is_finite();
+    is_possible.then_some(Some(radius)).ok_or("lens has no possible radius")
 }

@@ -1,6 +1,6 @@
 //! Nodes, parents first, and what stands at them.
 
-use super::animation::{self, Animated};
+use super::animation::{self, Animated, Channels};
 use super::document::{Node as Row, Real, Transform, UsdFog, UsdLux, label, usd_path};
 use super::geometry::{Compiled, Meshes};
 use super::lights::{self, Placed};
@@ -10,11 +10,12 @@ use super::profiles::Profiles;
 use super::{Output, Source, cameras, fog, instancing};
 use crate::ingest::error::Fault;
 use crate::ingest::paths::{PrimPaths, component};
-use crate::scene::{Category, Channel, Instance, Light, Links, Node, Trs};
+use crate::scene::{Category, Channel, Instance, LensKeys, Light, Links, Node, Trs};
 use glam::{DAffine3, DMat4, DQuat, DVec3};
 use gltf::json::{Index, Mesh};
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 use std::mem;
+use std::sync::Arc;
 
 /// How far a scale may be from uniform for a sphere to stay a sphere.
 const UNIFORM_TOLERANCE: f64 = 1e-4;
@@ -41,7 +42,9 @@ struct Hanging {
 /// What grows while the hierarchy is walked.
 struct Walk<'a> {
     source: &'a Source<'a>,
-    channels: Vec<Vec<Channel>>,
+    channels: Channels,
+    /// By camera of the file.
+    lenses: BTreeMap<usize, Arc<LensKeys>>,
     /// For each node of the file where it was placed first.
     placed: Vec<Option<u32>>,
     meshes: Meshes,
@@ -57,11 +60,12 @@ struct Walk<'a> {
 
 /// Compiles the nodes of the file's scene and everything at them.
 pub(super) fn compile(source: &Source, output: &mut Output) -> Result<(), Fault> {
-    let Animated { channels, weights } = animation::compile(source, output)?;
+    let Animated { channels, weights, lenses } = animation::compile(source, output)?;
     let mut walk = Walk {
         source,
         poses: Poses::new(source, output, &channels, weights)?,
         channels,
+        lenses,
         hanging: Vec::new(),
         placed: vec![None; source.document.nodes.len()],
         meshes: Meshes::new(source),
@@ -70,6 +74,9 @@ pub(super) fn compile(source: &Source, output: &mut Output) -> Result<(), Fault>
         profiles: Profiles::default(),
         uniform: Vec::new(),
     };
+    let rows = &source.document.nodes;
+    output.scene.nodes.reserve_exact(rows.len());
+    output.scene.lights.reserve_exact(rows.iter().filter(|row| row.light.is_some()).count());
     // A stack, so that no depth of the hierarchy is a depth of calls.
     if let Some((number, scene)) = source.document.default_scene() {
         fog::of_scene(output, number, scene)?;
@@ -82,6 +89,10 @@ pub(super) fn compile(source: &Source, output: &mut Output) -> Result<(), Fault>
         let visible = visible && !source.document.beside.hidden.contains(&number);
         let node = walk.place(output, number, row, parent)?;
         let object = label("node", number, row.name.as_deref());
+        if let Some(camera) = row.camera() {
+            let camera = (camera, walk.lenses.get(&camera.value()));
+            cameras::compile(source, output, camera, row, (node, !visible), &object)?;
+        }
         if visible {
             walk.furnish(output, number, row, node, &object)?;
         } else if row.mesh.is_some()
@@ -91,8 +102,8 @@ pub(super) fn compile(source: &Source, output: &mut Output) -> Result<(), Fault>
             // The file says that it is not to be seen: nothing is lost.
             output.notes.add(Category::Other, object, "is hidden (KHR_node_visibility); left out");
         }
-        let children = source.forest.children(number).iter().rev();
-        stack.extend(children.map(|&child| open(child, Some(node), visible)));
+        let children = source.forest.children(number).rev();
+        stack.extend(children.map(|child| open(child, Some(node), visible)));
     }
     walk.hang(output)?;
     walk.links.finish(output)
@@ -117,7 +128,7 @@ impl Walk<'_> {
         };
         let object = || label("node", number, row.name.as_deref());
         let channels = match self.placed[number] {
-            None => mem::take(&mut self.channels[number]),
+            None => self.channels.remove(&number).unwrap_or_default(),
             // Below another parent it moves alike.
             Some(first) => {
                 let channels = &output.scene.nodes[first as usize].channels;
@@ -151,7 +162,7 @@ impl Walk<'_> {
         Ok(output.scene.nodes.len() as u32 - 1)
     }
 
-    /// Adds the camera, fog, light and meshes of a node.
+    /// Adds the fog, light and meshes of a node.
     fn furnish(
         &mut self,
         output: &mut Output,
@@ -160,9 +171,6 @@ impl Walk<'_> {
         node: u32,
         object: &str,
     ) -> Result<(), Fault> {
-        if let Some(camera) = row.camera {
-            cameras::compile(self.source, output, camera, row, node, object);
-        }
         let membership = self.links.membership(output, &row.extras, None, object)?;
         let had_fog = output.scene.medium.is_some();
         fog::of_node(output, &row.extras, node, object)?;
@@ -180,7 +188,7 @@ impl Walk<'_> {
         let shaping = self.profiles.shaping(self.source, output, lux.as_ref(), object)?;
         let told = (lux.as_ref(), shaping);
         let light = lights::of_node(self.source, output, number, told, node, object)?
-            .map(|light| Light { values: values.take(), ..light });
+            .map(|light| Light { values: values.take().map(Box::new), ..light });
         let has_light = light.is_some();
         if has_light {
             self.links.add_light(output, links)?;

@@ -14,7 +14,7 @@ use gltf::json::validation::Checked;
 use std::f32::consts::{FRAC_PI_2, FRAC_PI_4};
 
 /// More keys than this are refused: half a day of frames at 24 a second.
-const MOST_KEYS: usize = 1 << 20;
+pub(super) const MOST_KEYS: usize = 1 << 20;
 
 /// What a node says of the meshes at it.
 #[derive(Clone, Copy)]
@@ -47,10 +47,10 @@ impl Placed<'_> {
     }
 
     /// A copy of the values for one more light.
-    pub(super) fn copy_values(&self, output: &mut Output) -> Result<Option<Keys<Rgb>>, Fault> {
+    pub(super) fn copy_values(&self, output: &mut Output) -> Result<Option<Box<Keys<Rgb>>>, Fault> {
         let bytes = self.values.map_or(0, |keys| keys.times_s.len() * size_of::<(f32, Rgb)>());
         output.budget.take(bytes as u64, || self.object.to_string())?;
-        Ok(self.values.cloned())
+        Ok(self.values.cloned().map(Box::new))
     }
 }
 

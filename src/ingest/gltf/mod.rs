@@ -16,7 +16,7 @@
 //! | `instancing`, `geometry`, `attributes` | meshes |
 //! | `posing` | skins and morph targets |
 //! | `materials`, `glossiness`, `coat`, `glass`, `textures` | surfaces |
-//! | `lights`, `fog`, `cameras`, `animation` | what they say |
+//! | `lights`, `fog`, `cameras`, `lenses`, `animation` | what they say |
 //! | `links` | which lights light what |
 
 mod accessors;
@@ -35,6 +35,7 @@ mod glass;
 mod glossiness;
 mod hierarchy;
 mod instancing;
+mod lenses;
 mod lights;
 mod links;
 mod materials;
@@ -79,6 +80,7 @@ pub(super) fn load(path: &Path, must_be_glb: bool) -> Result<Scene, Fault> {
     let folder = Folder::of(path)?;
     budget.grow(file.size() as u64);
     let document = Document::parse(file.json(), &mut budget, &mut notes)?;
+    let file = file.parsed();
     extensions::check(&document, &mut notes)?;
     let forest = Forest::new(&document, &mut notes)?;
     let buffers = Buffers::read(&document, &file, &folder)?;

@@ -98,7 +98,7 @@ pub(super) fn audit(
     }
     let seed = hash(settings.seed, u32::MAX);
     delegate.set_settings(RenderSettings { seed, aovs: Vec::new(), ..settings.clone() });
-    let mut again = delegate.film()?;
+    let mut again = delegate.film(frame)?;
     delegate.expose(tree, frame, &mut again, &mut Planned(counts.clone()), progress)?;
     let again = Reference::of(&again.halves(), again.window().width() as usize);
     let own: Vec<f64> = film.halves().iter().map(Halves::luminance).collect();

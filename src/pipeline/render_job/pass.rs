@@ -38,7 +38,7 @@ pub(super) struct Pass<'a> {
     /// Whether the user has been told what that is worth.
     caveat_is_told: bool,
     outputs: &'a Outputs<'a>,
-    stamper: Stamper,
+    stamper: Stamper<'a>,
     watch: &'a dyn Watch,
     clock: &'a mut Clock,
     /// Prepared when the first frame needs it: a shot that is done resumes at once.
@@ -180,7 +180,7 @@ impl<'a> Pass<'a> {
         let tree = trees.for_frame(frame)?;
         clock.lap(|seconds| &mut seconds.trees);
         let picture = self.outputs.picture(frame);
-        let blank = || delegate.film().map_err(render::RenderError::from);
+        let blank = || delegate.film(frame).map_err(render::RenderError::from);
         let checkpoint = job.checkpoint.then(|| Checkpoint::of(&picture, &stamp, *watch));
         let earlier = checkpoint.as_ref().map(|own| Ok::<_, Trouble>(own.restore(blank()?)));
         let mut film = match earlier.transpose()?.flatten() {

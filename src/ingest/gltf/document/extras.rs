@@ -35,6 +35,29 @@ pub(in crate::ingest::gltf) struct UsdCamera {
     #[serde(rename = "clippingRange_m")]
     pub clipping_range_m: Option<[Real; 2]>,
     pub shutter: Option<[Real; 2]>,
+    #[serde(default)]
+    pub hidden: bool,
+    pub values: Option<UsdLens>,
+}
+
+/// `extras.usdCamera.values`: what of the lens varies, one value for each time.
+#[derive(Deserialize)]
+pub(in crate::ingest::gltf) struct UsdLens {
+    pub times: Vec<Real>,
+    pub yfov: Option<Vec<Real>>,
+    pub ymag: Option<Vec<Real>>,
+    #[serde(rename = "fStop")]
+    pub f_stop: Option<Vec<Real>>,
+    #[serde(rename = "focalLength_m")]
+    pub focal_length_m: Option<Vec<Real>>,
+    #[serde(rename = "focusDistance_m")]
+    pub focus_distance_m: Option<Vec<Real>>,
+    #[serde(rename = "filmOffset")]
+    pub film_offset: Option<Vec<[Real; 2]>>,
+    #[serde(rename = "exposureScale")]
+    pub exposure_scale: Option<Vec<Real>>,
+    #[serde(rename = "clippingRange_m")]
+    pub clipping_range_m: Option<Vec<[Real; 2]>>,
 }
 
 /// `extras.usdLux`: the light at a node.

@@ -12,7 +12,7 @@ mod reference;
 
 pub(super) use beside::{Beside, Instancing, Target};
 pub(super) use extras::{
-    AssetUsd, UsdCamera, UsdFog, UsdIes, UsdLinks, UsdLux, UsdValues, usd_path,
+    AssetUsd, UsdCamera, UsdFog, UsdIes, UsdLens, UsdLinks, UsdLux, UsdValues, usd_path,
 };
 pub(super) use node::{Node, Transform};
 pub(super) use real::{Real, reals};
@@ -37,6 +37,8 @@ use std::ops::Deref;
 
 /// More JSON than this is not parsed.
 const MOST_JSON_BYTES: usize = 512 << 20;
+/// So many nodes are parsed side by side.
+const BLOCK: usize = 1 << 14;
 
 /// An object of the file that is not parsed yet.
 type Row = Map<String, Value>;
@@ -189,15 +191,24 @@ impl<'a> Tables<'a, '_> {
     /// Parses the nodes.
     fn nodes(&mut self, kind: &Kind, beside: &mut Beside) -> Result<Vec<Node>, Fault> {
         let rows = self.rows("nodes", kind, size_of::<Node>())?;
-        let plain: Vec<Option<Node>> = rows.par_iter().map(|row| Node::plain(row.get())).collect();
-        let node = |(i, (node, row)): (usize, (Option<Node>, &&RawValue))| match node {
-            Some(node) => Ok(node),
-            None => {
-                let (row, transform) = self.row(row, kind, i, |row, i| beside.node(row, i))?;
-                Ok(Node::of(row, transform))
+        let plain = |row: &&RawValue| Node::plain(row.get());
+        let mut nodes = Vec::with_capacity(rows.len());
+        for block in rows.chunks(BLOCK) {
+            let read: Vec<Option<Node>> = block.par_iter().map(plain).collect();
+            for (node, row) in read.into_iter().zip(block) {
+                let node = match node {
+                    Some(node) => node,
+                    None => {
+                        let number = nodes.len();
+                        let prepare = |row: &mut Row, number| beside.node(row, number);
+                        let (row, transform) = self.row(row, kind, number, prepare)?;
+                        Node::of(row, transform)
+                    }
+                };
+                nodes.push(node);
             }
-        };
-        plain.into_iter().zip(&rows).enumerate().map(node).collect()
+        }
+        Ok(nodes)
     }
 
     /// The rows of a table, each of which will take so many bytes; none if it is no table.

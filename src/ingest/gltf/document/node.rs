@@ -16,11 +16,16 @@ pub(in crate::ingest::gltf) struct Node {
     pub transform: Transform,
     pub mesh: Option<Index<Mesh>>,
     pub light: Option<Index<Light>>,
-    pub camera: Option<Index<Camera>>,
-    pub skin: Option<Index<Skin>>,
-    /// Of the morph targets.
-    pub weights: Option<Vec<f32>>,
     pub extras: Extras,
+    rare: Option<Box<Rare>>,
+}
+
+/// What few nodes have.
+#[derive(Debug)]
+struct Rare {
+    camera: Option<Index<Camera>>,
+    skin: Option<Index<Skin>>,
+    weights: Option<Vec<f32>>,
 }
 
 /// A node's place below its parent, in double precision: large translations cancel and leave small ones.
@@ -94,10 +99,8 @@ impl Node {
             transform: Transform { matrix, translation, rotation, scale },
             mesh: plain.mesh.map(Number::index),
             light: punctual.map(|punctual| punctual.light.index()),
-            camera: None,
-            skin: None,
-            weights: None,
             extras: plain.extras.map(ToOwned::to_owned),
+            rare: None,
         })
     }
 
@@ -105,17 +108,30 @@ impl Node {
     pub(super) fn of(row: gltf::json::Node, transform: Transform) -> Node {
         let extensions = row.extensions.and_then(|extensions| extensions.khr_lights_punctual);
         let children = row.children.unwrap_or_default();
+        let rare = Rare { camera: row.camera, skin: row.skin, weights: row.weights };
+        let has_any = rare.camera.is_some() || rare.skin.is_some() || rare.weights.is_some();
         Node {
             name: row.name.map(String::into_boxed_str),
             children: children.iter().map(|child| child.value() as u32).collect(),
             transform,
             mesh: row.mesh,
             light: extensions.map(|punctual| punctual.light),
-            camera: row.camera,
-            skin: row.skin,
-            weights: row.weights,
             extras: row.extras,
+            rare: has_any.then(|| Box::new(rare)),
         }
+    }
+
+    pub fn camera(&self) -> Option<Index<Camera>> {
+        self.rare.as_ref()?.camera
+    }
+
+    pub fn skin(&self) -> Option<Index<Skin>> {
+        self.rare.as_ref()?.skin
+    }
+
+    /// Of the morph targets.
+    pub fn weights(&self) -> Option<&Vec<f32>> {
+        self.rare.as_ref()?.weights.as_ref()
     }
 }
 
