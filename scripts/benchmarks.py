@@ -14,9 +14,11 @@ import json
 import os
 import platform
 import re
+import statistics
 import subprocess
 import sys
 import tempfile
+import time
 from datetime import date
 from pathlib import Path
 
@@ -102,12 +104,51 @@ def what_is_paid(quick):
     return table(told([sys.executable, "scripts/what_is_paid.py"] + ["--quick"] * quick, judges=True))
 
 
+def make_scenes(folder, *names):
+    """Makes seed scenes in a folder."""
+    make = '. scripts/environment.sh; environment scripts/requirements.txt; "$python" scenes/seed/make.py --output "$@"'
+    told(["sh", "-c", make, "make", folder, *names])
+
+
+def spent(command):
+    """Seconds that a program takes, and its memory at peak in MB."""
+    print(f"== {' '.join(map(str, command))}", file=sys.stderr, flush=True)
+    started = time.perf_counter()
+    process = subprocess.Popen([str(word) for word in command], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    _, status, usage = os.wait4(process.pid, 0)
+    if status:
+        sys.exit(f"failed: {' '.join(map(str, command))}")
+    return time.perf_counter() - started, usage.ru_maxrss / 1000
+
+
+def opening(quick):
+    told(["cargo", "build", "--release", "--quiet", "--bins"])
+    rounds = 1 if quick else 7
+    rows = []
+    with tempfile.TemporaryDirectory() as folder:
+        name = "lamps_1000" if quick else "million_points"
+        make_scenes(folder, name)
+        scene, tree, picture = (Path(folder) / file for file in (f"{name}.glb", "lights.lt", "picture.exr"))
+        build = [TARGET / "release" / "candelabra", "build", scene, "-o", tree, "--force"]
+        render = [TARGET / "release" / "candelabra-render", scene, "-o", picture, "--res", "16x9", "--spp", "1"]
+        render += ["--depth", "1", "--split", "0"]
+        for what, command in (
+            ("`candelabra build`", build),
+            ("a picture of 144 samples, with the tree", [*render, "--tree", tree]),
+            ("the same without it", render),
+        ):
+            took, peak = zip(*(spent(command) for _ in range(rounds)))
+            rows.append(f"| {what} | {statistics.median(took):.2f} s | {max(peak):.0f} MB |")
+        size = scene.stat().st_size / 1e6
+    head = f"| `{name}`, {size:.0f} MB | a process, all told | memory at peak |\n|---|---|---|\n"
+    return head + "\n".join(rows)
+
+
 def profile(quick):
     told(["cargo", "build", "--release", "--quiet", "--bins"])
     names = ["lamps_10"] if quick else ["spiral_points", "spiral_mesh", "lamps_10", "lamps_1000"]
     with tempfile.TemporaryDirectory() as folder:
-        make = '. scripts/environment.sh; environment scripts/requirements.txt; "$python" scenes/seed/make.py --output "$@"'
-        told(["sh", "-c", make, "make", folder, *names])
+        make_scenes(folder, *names)
         scenes = [Path(folder) / f"{name}.glb" for name in names]
         command = [sys.executable, "scripts/profile.py", TARGET / "release", *scenes, "--options"]
         one, default = (table(told([*command, options])) for options in ("--split 0 --depth 1", "--depth 5"))
@@ -119,6 +160,7 @@ BLOCKS = {
     "one_changed": (one_changed, "cargo bench --bench light_tree"),
     "break_even": (break_even, "cargo bench --bench break_even"),
     "one_frame": (one_frame, "python3 scripts/one_frame.py target/release"),
+    "opening": (opening, "candelabra build; candelabra-render"),
     "profile": (profile, "python3 scripts/profile.py target/release SCENE..."),
     "what_is_paid": (what_is_paid, "python3 scripts/what_is_paid.py"),
 }

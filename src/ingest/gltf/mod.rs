@@ -8,7 +8,7 @@
 //! | file | what |
 //! |---|---|
 //! | `container` | the JSON and the binary chunk of a file |
-//! | `document` | JSON to typed rows |
+//! | `document` | JSON to typed rows; nodes, of which there may be millions, by a way of their own |
 //! | `extensions` | what must be supported |
 //! | `forest` | which nodes are below which |
 //! | `buffers`, `accessors` | arrays in the buffers |
