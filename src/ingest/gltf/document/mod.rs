@@ -134,6 +134,13 @@ impl Document {
         Some((number, self.scenes.get(number)?))
     }
 
+    /// How many lights `KHR_lights_punctual` lists.
+    pub(super) fn light_count(&self) -> usize {
+        let extensions = self.extensions.as_ref();
+        let punctual = extensions.and_then(|all| all.khr_lights_punctual.as_ref());
+        punctual.map_or(0, |punctual| punctual.lights.len())
+    }
+
     /// The light at a node.
     pub(super) fn light_at(&self, node: usize) -> Option<Index<Light>> {
         let extensions = self.nodes[node].extensions.as_ref()?;
