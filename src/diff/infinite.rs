@@ -34,14 +34,14 @@ pub(super) fn find(scene: &Scene, pose: &Pose, frames: &[i32]) -> Vec<Infinite> 
     let found = lights.map(|(row, light)| {
         let rgb = scene.rgb_of_light(row as u32, pose);
         let way = ways.get(&light.node);
-        let (moves, varies) = (way.is_some(), light.values.as_ref().is_some_and(Keys::varies));
+        let (moves, varies) = (way.is_some(), light.values.as_deref().is_some_and(Keys::varies));
         let profile = profile(scene, &light.kind);
         let mut hasher = blake3::Hasher::new();
         hasher.update(&profile.pattern.to_le_bytes());
         hasher.update(&profile.half_angle_rad.unwrap_or(0.0).to_le_bytes());
         hasher.update(bytemuck::bytes_of(&rgb));
         hasher.update(bytemuck::bytes_of(&pose.world(light.node).matrix3.to_cols_array()));
-        if let Some(keys) = light.values.as_ref().filter(|keys| keys.varies()) {
+        if let Some(keys) = light.values.as_deref().filter(|keys| keys.varies()) {
             // Frame by frame: which second a frame is says nothing of the light.
             for &frame in frames {
                 let time_s = scene.timeline.seconds_at(frame.into());

@@ -93,10 +93,7 @@ fn common_prims<'a>(scenes: [&'a SceneSide<'a>; 2]) -> BTreeMap<&'a str, [Option
         return prims;
     }
     let rows = scenes.map(|side| -> HashMap<&str, u32> {
-        (0..)
-            .zip(&side.scene.instances)
-            .map(|(row, instance)| (instance.path.as_str(), row))
-            .collect()
+        (0..).zip(&side.scene.instances).map(|(row, instance)| (&*instance.path, row)).collect()
     });
     for (path, row) in &rows[0] {
         let Some(other) = rows[1].get(path) else { continue };

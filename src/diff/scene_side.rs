@@ -158,7 +158,7 @@ impl<'a> SceneSide<'a> {
             self.lights().iter().map(|light| light.path).collect();
         let meshes = (0..)
             .zip(&self.scene.instances)
-            .map(|(row, instance)| (instance.path.as_str(), Dark::Mesh(row)));
+            .map(|(row, instance)| (&*instance.path, Dark::Mesh(row)));
         let lights = (0..self.scene.lights.len())
             .map(|row| (self.scene.light_path(row), Dark::Light(row as u32)));
         meshes.chain(lights).filter(|(path, _)| !is_lit.contains(path)).collect()

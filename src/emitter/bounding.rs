@@ -47,7 +47,7 @@ impl PosedEmitters<'_> {
                 }
                 LightSource::Light(row) => self.bounds_of_light(row),
             };
-            sound(bounds).ok_or_else(|| LightOverflow { path: light.path.clone() })
+            sound(bounds).ok_or_else(|| LightOverflow { path: light.path.to_string() })
         };
         emitters.into_par_iter().map(bounds_of).collect()
     }
@@ -67,7 +67,7 @@ impl PosedEmitters<'_> {
                 matches!(entry.source, LightSource::Mesh { mesh_light: row, .. } if row == mesh_light)
             };
             let path = self.emitters.lights().iter().find(is_instance);
-            LightOverflow { path: path.map_or_else(String::new, |entry| entry.path.clone()) }
+            LightOverflow { path: path.map_or_else(String::new, |entry| entry.path.to_string()) }
         })
     }
 

@@ -5,7 +5,9 @@ use super::textured::{KnownMeans, TextureMeans};
 use crate::math::Similarity;
 use crate::math::color::{Rgb, luminance};
 use crate::scene::{Keys, LightKind, Links, Scene};
+use rayon::prelude::*;
 use std::collections::HashMap;
+use std::sync::Arc;
 
 /// What the tree picks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -48,7 +50,7 @@ pub enum LightSource {
 #[derive(Clone, Debug)]
 pub struct LightEntry {
     /// Prim path.
-    pub path: String,
+    pub path: Arc<str>,
     /// Where it comes from.
     pub source: LightSource,
     /// Whether its node moves with time.
@@ -131,10 +133,10 @@ impl Emitters {
         for (i, light) in scene.lights.iter().enumerate() {
             if shines(&light.kind, scene.peak_rgb_of_light(i as u32)) {
                 lights.push(LightEntry {
-                    path: scene.light_path(i).to_owned(),
+                    path: scene.nodes[light.node as usize].path.clone(),
                     source: LightSource::Light(i as u32),
                     moves: moving[light.node as usize],
-                    varies: light.values.as_ref().is_some_and(Keys::varies),
+                    varies: light.values.as_deref().is_some_and(Keys::varies),
                     deforms: false,
                     forced: light.forced,
                     in_own_space: false,
@@ -145,7 +147,7 @@ impl Emitters {
                 });
             }
         }
-        lights.sort_by(|a, b| a.class().cmp(&b.class()).then_with(|| a.path.cmp(&b.path)));
+        lights.par_sort_by(|a, b| a.class().cmp(&b.class()).then_with(|| a.path.cmp(&b.path)));
         Emitters { texture_means: means, ..Emitters::number(scene, lights, mesh_lights) }
     }
 
@@ -315,7 +317,7 @@ fn mesh_entries(
         let deforms = scene.changes_shape(instance.mesh);
         let count = mesh_lights[mesh_light as usize].count;
         let (moves, varies) =
-            (moving[instance.node as usize], instance.values.as_ref().is_some_and(Keys::varies));
+            (moving[instance.node as usize], instance.values.as_deref().is_some_and(Keys::varies));
         let is_shared = users[mesh_light as usize] > 1 || moves || varies;
         let is_placed = !(deforms || (moves && is_blurred)) && keeps_shapes(instance.node);
         Some(LightEntry {

@@ -79,17 +79,14 @@ mod tests {
     fn scene(triangles: usize, instances: usize, scale: DVec3, emission: Rgb) -> Scene {
         let local = Trs::Parts { translation: DVec3::ZERO, rotation: DQuat::IDENTITY, scale };
         let triangles = vec![[0, 0, 0]; triangles];
-        let instance = |i: usize| {
-            let path = format!("/{i}");
-            Instance {
-                path,
-                node: 0,
-                mesh: 0,
-                values: None,
-                shaping: None,
-                forced: false,
-                visibility: Visibility::ALL,
-            }
+        let instance = |i: usize| Instance {
+            path: format!("/{i}").into(),
+            node: 0,
+            mesh: 0,
+            values: None,
+            shaping: None,
+            forced: false,
+            visibility: Visibility::ALL,
         };
         Scene {
             nodes: vec![Node::fixed("/n", None, local)],

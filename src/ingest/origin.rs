@@ -9,6 +9,7 @@
 use super::notes::Notes;
 use crate::scene::{Category, LightKind, Pose, Scene};
 use glam::{DVec3, Vec3};
+use std::sync::Arc;
 
 /// The origin is a multiple of the power of two that follows on so many reaches: no scene is farther
 /// from its origin than about that, and no scene nearer than half of it has another than 0.
@@ -21,16 +22,20 @@ struct Thing {
     middle: Vec3,
     radius_m: f32,
     /// The path of a prim whose corners are rounded.
-    path: Option<String>,
+    path: Option<Arc<str>>,
 }
 
 /// Moves the origin of a scene to where it belongs, and notes what is too far from it.
 pub(super) fn settle(scene: &mut Scene) {
-    scene.origin = choose(&things(scene, &scene.pose_at(0.0)));
+    let mut seen = things(scene, &scene.pose_at(0.0));
+    scene.origin = choose(&seen);
+    if scene.origin != DVec3::ZERO {
+        seen = things(scene, &scene.pose_at(0.0));
+    }
     let mut notes = Notes::default();
     let mut worst: f64 = 0.0;
     let mut small = Vec::new();
-    for thing in things(scene, &scene.pose_at(0.0)) {
+    for thing in seen {
         let rounding = 0.5 * f64::from(f32::EPSILON * thing.middle.abs().max_element());
         let share = rounding / f64::from(thing.radius_m);
         if let Some(path) = thing.path.filter(|_| share > NOTED) {
@@ -42,7 +47,7 @@ pub(super) fn settle(scene: &mut Scene) {
     for path in small {
         notes.add(
             Category::Geometry,
-            path,
+            &*path,
             format!(
                 "is small and far from most of the scene, which is calculated around ({x}, {y}, \
                  {z}): rounding moves its corners by up to {:.2} % of its size; put it into a file \

@@ -1,6 +1,7 @@
 //! Prim paths, each given once.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
+use std::sync::Arc;
 
 /// A name longer than this is cut: paths repeat the names of all ancestors.
 const LONGEST_NAME: usize = 128;
@@ -8,26 +9,28 @@ const LONGEST_NAME: usize = 128;
 /// Gives out paths; one that is taken gets a number: `/World/lamp`, `/World/lamp_2`.
 #[derive(Default)]
 pub(super) struct PrimPaths {
-    /// Every path given, with the last number that was tried after it.
-    given: HashMap<String, u32>,
+    /// Every path given.
+    given: HashSet<Arc<str>>,
+    /// The last number that was tried after a path, of those that were wanted again.
+    tried: HashMap<Arc<str>, u32>,
 }
 
 impl PrimPaths {
-    pub(super) fn claim(&mut self, wanted: String) -> String {
-        if !self.given.contains_key(&wanted) {
-            self.given.insert(wanted.clone(), 1);
-            return wanted;
-        }
-        let mut number = self.given[&wanted];
-        let free = loop {
-            number += 1;
-            let numbered = format!("{wanted}_{number}");
-            if !self.given.contains_key(&numbered) {
-                break numbered;
+    /// With room for so many.
+    pub(super) fn with_room(paths: usize) -> PrimPaths {
+        PrimPaths { given: HashSet::with_capacity(paths), ..PrimPaths::default() }
+    }
+
+    pub(super) fn claim(&mut self, wanted: &str) -> Arc<str> {
+        let mut free: Arc<str> = wanted.into();
+        if self.given.contains(wanted) {
+            let number = self.tried.entry(free.clone()).or_insert(1);
+            while self.given.contains(&free) {
+                *number += 1;
+                free = format!("{wanted}_{number}").into();
             }
-        };
-        self.given.insert(wanted, number);
-        self.given.insert(free.clone(), 1);
+        }
+        self.given.insert(free.clone());
         free
     }
 }
@@ -50,8 +53,8 @@ mod tests {
     #[test]
     fn paths_are_unique() {
         let mut paths = PrimPaths::default();
-        let given: Vec<_> = ["/a", "/a", "/a_2", "/a"].map(|p| paths.claim(p.into())).into();
-        assert_eq!(given, ["/a", "/a_2", "/a_2_2", "/a_3"]);
+        let given: Vec<_> = ["/a", "/a", "/a_2", "/a"].map(|p| paths.claim(p)).into();
+        assert_eq!(given, ["/a", "/a_2", "/a_2_2", "/a_3"].map(Arc::from));
     }
 
     #[test]

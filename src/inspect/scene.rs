@@ -111,7 +111,7 @@ impl CameraReport {
         let (first, last) = (height(frames[0]), height(frames[frames.len() - 1]));
         let is_parallel = matches!(camera.projection, Projection::Orthographic { .. });
         CameraReport {
-            path: scene.nodes[camera.node as usize].path.clone(),
+            path: scene.nodes[camera.node as usize].path.to_string(),
             height_deg: (!is_parallel).then_some(first),
             height_m: is_parallel.then_some(first),
             last_height: (last != first).then_some(last),

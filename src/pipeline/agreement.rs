@@ -172,7 +172,7 @@ impl<'a, D: AsRef<[u8]> + Sync> Agreement<'a, D> {
                 true if told != (light.first, light.count) => "its emitters",
                 true => return None,
             };
-            Some(Contradiction { path: light.path.clone(), what })
+            Some(Contradiction { path: light.path.to_string(), what })
         };
         rows.par_iter().enumerate().find_map_first(differs)
     }

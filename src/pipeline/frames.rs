@@ -12,8 +12,8 @@ pub fn frames_of(scene: &Scene) -> Vec<i32> {
             Channel::Translation(keys) | Channel::Scale(keys) => keys.times_s.last(),
             Channel::Rotation(keys) => keys.times_s.last(),
         });
-        let of_lights = scene.lights.iter().filter_map(|light| light.values.as_ref());
-        let of_meshes = scene.instances.iter().filter_map(|instance| instance.values.as_ref());
+        let of_lights = scene.lights.iter().filter_map(|light| light.values.as_deref());
+        let of_meshes = scene.instances.iter().filter_map(|instance| instance.values.as_deref());
         let values = of_lights.chain(of_meshes).map(|keys: &Keys<_>| keys.times_s.last());
         let deformations = scene.meshes.iter().filter_map(|mesh| mesh.deformation.as_ref());
         let weights = deformations.flat_map(|deformation| deformation.weights.iter());

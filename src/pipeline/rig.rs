@@ -21,7 +21,7 @@ pub fn carry_camera(from: &Scene, camera: &Camera, into: &mut Scene) -> Camera {
     for &number in chain.iter().rev() {
         let Node { path, local, channels, .. } = from.nodes[number as usize].clone();
         let path = format!("{}:{path}", from.source.display());
-        let mut node = Node { path, parent, local, channels };
+        let mut node = Node { path: path.into(), parent, local, channels };
         if from.timeline != into.timeline {
             node.channels.iter_mut().for_each(|c| retime(c, &from.timeline, &into.timeline));
         }
@@ -153,7 +153,7 @@ mod tests {
             let zoom = Camera { over_time: Some(Arc::new(lens)), ..Camera::perspective(2, 0.5) };
             let camera = carry_camera(&from, &zoom, &mut into);
             assert_eq!(into.nodes.len(), 3);
-            assert_eq!(into.nodes[2].path, "cam.glb:/rig/eye");
+            assert_eq!(&*into.nodes[2].path, "cam.glb:/rig/eye");
             assert_eq!(super::super::frames_of(&into), frames, "the shot is no longer than it was");
             for frame in [1000.0, 1001.0, 1005.5, 1020.0, 1100.0, 1200.0] {
                 let place = |scene: &Scene, node: u32| {

@@ -131,7 +131,7 @@ impl<'a> Stamper<'a> {
     pub fn stamp(&self, frame: i32, plan: Option<&Plan>, tree: [u8; 32]) -> Stamp {
         let Stamper { scene, camera, .. } = self;
         let exposure_scale = scene.camera_at(camera, frame.into()).exposure_scale;
-        let path = &scene.nodes[camera.node as usize].path;
+        let path = &*scene.nodes[camera.node as usize].path;
         Stamp {
             software: SOFTWARE.into(),
             frame,

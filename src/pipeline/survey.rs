@@ -213,7 +213,7 @@ impl Survey {
                 None => sum(group.own_bounds(light)),
             });
             LightSummary {
-                path: light.path.clone(),
+                path: light.path.to_string(),
                 fingerprint: self.fingerprint_of(row as u32, light),
                 emitter_count: light.count,
                 energy: energy.min(f64::from(f32::MAX)) as f32,
@@ -261,7 +261,7 @@ mod tests {
             lights: vec![Light {
                 node: 0,
                 kind: LightKind::Point { intensity_cd: Rgb::ONE },
-                values: Some(values),
+                values: Some(values.into()),
                 range_m: None,
                 forced: false,
                 visibility: Visibility::default(),

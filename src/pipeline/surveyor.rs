@@ -192,7 +192,7 @@ impl<'a> Surveyor<'a> {
             && let Some(shared) = self.own[mesh_light as usize].filter(|_| light.in_own_space)
         {
             let (to_local, brightness) =
-                posed.placing(row).ok_or_else(|| LightOverflow { path: light.path.clone() })?;
+                posed.placing(row).ok_or_else(|| LightOverflow { path: light.path.to_string() })?;
             return Ok(placed(shared, to_local, brightness));
         }
         // A forced light of any other kind has a tree of its own in world space.
@@ -224,7 +224,7 @@ impl<'a> Surveyor<'a> {
             .flat_map(|group| self.energies(group))
             .max_by(|a, b| a.1.total_cmp(&b.1));
         let light = strongest.map_or(0, |(light, _)| light);
-        Err(LightOverflow { path: self.emitters.lights()[light as usize].path.clone() })
+        Err(LightOverflow { path: self.emitters.lights()[light as usize].path.to_string() })
     }
 
     /// The lights of a group, emitter by emitter, with the energies that must fit.

@@ -153,7 +153,7 @@ pub fn look(scene: &mut Scene, view: &View, aspect: f32) -> Result<Look, ViewErr
 }
 
 fn by_path<'a>(scene: &'a Scene, wanted: &str) -> Option<&'a Camera> {
-    scene.cameras.iter().find(|camera| scene.nodes[camera.node as usize].path == wanted)
+    scene.cameras.iter().find(|camera| &*scene.nodes[camera.node as usize].path == wanted)
 }
 
 /// The camera of some path or number; the default one if none is named.
@@ -165,7 +165,11 @@ fn find<'a>(scene: &'a Scene, wanted: Option<&str>) -> Result<&'a Camera, ViewEr
     by_path(scene, wanted).or_else(by_number).ok_or_else(|| ViewError::OfThatName {
         scene: source(),
         wanted: wanted.into(),
-        others: scene.cameras.iter().map(|c| scene.nodes[c.node as usize].path.clone()).collect(),
+        others: scene
+            .cameras
+            .iter()
+            .map(|c| scene.nodes[c.node as usize].path.to_string())
+            .collect(),
     })
 }
 

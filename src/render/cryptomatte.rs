@@ -51,7 +51,7 @@ impl ObjectIds {
             }
             channel += layer.channels.len();
         }
-        let instances = scene.instances.iter().map(|instance| instance.path.as_str());
+        let instances = scene.instances.iter().map(|instance| &*instance.path);
         let lights = (0..scene.lights.len()).map(|row| scene.light_path(row));
         let ids = self.instances.iter().chain(&self.lights);
         let names: BTreeMap<&str, String> = instances

@@ -12,7 +12,7 @@ pub struct Light {
     pub kind: LightKind,
     /// Where it varies with time: what takes the place of the strength in `kind`, in the same unit
     /// (candela, nits or lux). Never below zero; linear or stepped, not a spline.
-    pub values: Option<Keys<Rgb>>,
+    pub values: Option<Box<Keys<Rgb>>>,
     /// Beyond this distance in metres it gives no light (glTF `range`); `None` is physical.
     pub range_m: Option<f32>,
     /// Take it out of the importance heuristic and sample it at every point.

@@ -34,7 +34,7 @@ pub struct Mesh {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Instance {
     /// The prim's path; unique in the scene.
-    pub path: String,
+    pub path: Arc<str>,
     /// The node it stands at.
     pub node: u32,
     /// Index into [`Scene::meshes`](super::Scene::meshes).
@@ -42,7 +42,7 @@ pub struct Instance {
     /// Where the mesh's light varies with time: nits that take the place of the material's, which
     /// the material's emission texture multiplies. Never below zero; linear or stepped, not a
     /// spline.
-    pub values: Option<Keys<Rgb>>,
+    pub values: Option<Box<Keys<Rgb>>>,
     /// Profile of the mesh's emission about the node's -Z, if it has one.
     pub shaping: Option<Shaping>,
     /// Take the mesh's light out of the importance heuristic and sample it at every point.

@@ -114,7 +114,7 @@ pub struct Scene {
 impl Scene {
     /// Where everything is and how strong it shines at `time_s` seconds on the file's clock.
     pub fn pose_at(&self, time_s: f64) -> Pose {
-        Pose::evaluate(self, time_s).0
+        Pose::evaluate(self, time_s)
     }
 
     /// Whether two poses differ in nothing but from where the scene is seen, and in lights at infinity.
@@ -132,14 +132,15 @@ impl Scene {
     /// Whether any light but those at infinity moves, varies in strength or changes its shape.
     pub fn has_lights_that_change(&self) -> bool {
         let moving = self.moving_nodes();
-        let changes = |node: u32, values: &Option<Keys<_>>| {
-            moving[node as usize] || values.as_ref().is_some_and(Keys::varies)
+        let changes = |node: u32, values: Option<&Keys<_>>| {
+            moving[node as usize] || values.is_some_and(Keys::varies)
         };
         let shines = |row: &usize| self.peak_rgb_of_instance(*row as u32).max_element() > 0.0;
         let mut meshes = (0..self.instances.len()).filter(shines).map(|row| &self.instances[row]);
         let mut lights = self.lights.iter().filter(|light| !light.kind.is_infinite());
-        meshes.any(|mesh| changes(mesh.node, &mesh.values) || self.changes_shape(mesh.mesh))
-            || lights.any(|light| changes(light.node, &light.values))
+        meshes
+            .any(|mesh| changes(mesh.node, mesh.values.as_deref()) || self.changes_shape(mesh.mesh))
+            || lights.any(|light| changes(light.node, light.values.as_deref()))
     }
 
     /// For each node, whether it moves with time.

@@ -9,12 +9,13 @@ use crate::math::color::Rgb;
 use glam::{Affine3A, DAffine3, DQuat, DVec2, DVec3, Quat, Vec2, Vec3};
 use std::iter::Sum;
 use std::ops::Mul;
+use std::sync::Arc;
 
 /// A place in the transform hierarchy.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Node {
     /// The prim path, `/World/Lamps/lamp_12`; unique in the scene.
-    pub path: String,
+    pub path: Arc<str>,
     /// Index of the parent, smaller than this node's own.
     pub parent: Option<u32>,
     /// Local to parent, where no channel says otherwise.
@@ -93,23 +94,38 @@ impl Default for Trs {
 }
 
 impl Pose {
-    /// Composes the hierarchy in double precision, so that only the result is rounded. Returns the
-    /// unrounded transforms too.
-    pub(super) fn evaluate(scene: &Scene, time_s: f64) -> (Pose, Vec<DAffine3>) {
+    /// Composes the hierarchy in double precision, so that only the result is rounded.
+    pub(super) fn evaluate(scene: &Scene, time_s: f64) -> Pose {
         let at = Instant { time_s, timeline: scene.timeline };
-        let mut exact: Vec<DAffine3> = Vec::with_capacity(scene.nodes.len());
-        for node in &scene.nodes {
-            exact.push(node.in_world(scene.origin, &exact, at));
+        // Of millions of nodes few are parents: only theirs are kept, and where each is.
+        let mut exact: Vec<DAffine3> = Vec::new();
+        let mut kept = vec![u32::MAX; scene.nodes.len()];
+        for parent in scene.nodes.iter().filter_map(|node| node.parent) {
+            kept[parent as usize] = 0;
         }
-        let lights = scene.lights.iter().map(|light| light.values.as_ref());
-        let instances = scene.instances.iter().map(|instance| instance.values.as_ref());
-        let pose = Pose {
-            world: exact.iter().map(DAffine3::as_affine3a).collect(),
+        let world = scene.nodes.iter().enumerate().map(|(row, node)| {
+            let above = node.parent.map(|parent| &exact[kept[parent as usize] as usize]);
+            let transform = node.in_world(scene.origin, above, at);
+            if kept[row] == 0 {
+                kept[row] = exact.len() as u32;
+                exact.push(transform);
+            }
+            transform.as_affine3a()
+        });
+        let world = world.collect();
+        Pose::with(scene, world, at)
+    }
+
+    /// Given the transforms of all nodes.
+    pub(super) fn with(scene: &Scene, world: Vec<Affine3A>, at: Instant) -> Pose {
+        let lights = scene.lights.iter().map(|light| light.values.as_deref());
+        let instances = scene.instances.iter().map(|instance| instance.values.as_deref());
+        Pose {
+            world,
             light_rgb: values_at(lights, at),
             instance_rgb: values_at(instances, at),
-            shapes: Shapes::at(scene, time_s),
-        };
-        (pose, exact)
+            shapes: Shapes::at(scene, at.time_s),
+        }
     }
 
     /// The world-space radius of a sphere of some local radius at a node, metres. It grows with the
@@ -220,7 +236,7 @@ impl Node {
     }
 
     /// A node that stands still.
-    pub fn fixed(path: impl Into<String>, parent: Option<u32>, local: Trs) -> Node {
+    pub fn fixed(path: impl Into<Arc<str>>, parent: Option<u32>, local: Trs) -> Node {
         Node { path: path.into(), parent, local, channels: Vec::new() }
     }
 
@@ -229,11 +245,16 @@ impl Node {
         self.local_at(Instant { time_s, timeline })
     }
 
-    /// Local to world at a time, seen from an origin, given that of all nodes before.
-    pub(super) fn in_world(&self, origin: DVec3, before: &[DAffine3], at: Instant) -> DAffine3 {
+    /// Local to world at a time, seen from an origin, given that of its parent.
+    pub(super) fn in_world(
+        &self,
+        origin: DVec3,
+        parent: Option<&DAffine3>,
+        at: Instant,
+    ) -> DAffine3 {
         let local = self.local_at(at);
-        match self.parent {
-            Some(parent) => before[parent as usize] * local,
+        match parent {
+            Some(parent) => *parent * local,
             None => DAffine3 { translation: local.translation - origin, ..local },
         }
     }

@@ -21,8 +21,14 @@ pub struct Posing<'a> {
 impl<'a> Posing<'a> {
     /// A pose at second 0.
     pub fn new(scene: &'a Scene) -> Posing<'a> {
-        let (pose, exact) = Pose::evaluate(scene, 0.0);
-        let varies = |values: &Option<Keys<_>>| values.as_ref().is_some_and(Keys::varies);
+        let at = Instant { time_s: 0.0, timeline: scene.timeline };
+        let mut exact: Vec<DAffine3> = Vec::with_capacity(scene.nodes.len());
+        for node in &scene.nodes {
+            let parent = node.parent.map(|parent| &exact[parent as usize]);
+            exact.push(node.in_world(scene.origin, parent, at));
+        }
+        let pose = Pose::with(scene, exact.iter().map(DAffine3::as_affine3a).collect(), at);
+        let varies = |values: Option<&Keys<_>>| values.is_some_and(Keys::varies);
         let rows = |rows: &mut dyn Iterator<Item = bool>| {
             rows.enumerate().filter_map(|(row, is)| is.then_some(row)).collect()
         };
@@ -31,8 +37,8 @@ impl<'a> Posing<'a> {
             exact,
             pose,
             moving: rows(&mut moving(&scene.nodes).into_iter()),
-            lights: rows(&mut scene.lights.iter().map(|light| varies(&light.values))),
-            instances: rows(&mut scene.instances.iter().map(|row| varies(&row.values))),
+            lights: rows(&mut scene.lights.iter().map(|light| varies(light.values.as_deref()))),
+            instances: rows(&mut scene.instances.iter().map(|row| varies(row.values.as_deref()))),
         }
     }
 
@@ -43,7 +49,8 @@ impl<'a> Posing<'a> {
         let Posing { scene, exact, pose, .. } = self;
         for &row in &self.moving {
             let node = &scene.nodes[row];
-            exact[row] = node.in_world(scene.origin, exact, at);
+            let parent = node.parent.map(|parent| &exact[parent as usize]);
+            exact[row] = node.in_world(scene.origin, parent, at);
             pose.world[row] = exact[row].as_affine3a();
         }
         for &row in &self.lights {

@@ -81,7 +81,7 @@ impl Requirements {
             {
                 needs.mesh_lights += 1;
                 needs.varying_lights +=
-                    usize::from(instance.values.as_ref().is_some_and(Keys::varies));
+                    usize::from(instance.values.as_deref().is_some_and(Keys::varies));
                 needs.textured_mesh_lights += usize::from(material.emission_texture.is_some());
                 needs.shaped_lights += usize::from(instance.shaping.is_some());
                 needs.photometric_lights += usize::from(is_photometric(instance.shaping));
@@ -99,7 +99,7 @@ impl Requirements {
         }
         needs.shared_meshes = uses.iter().filter(|&&count| count > 1).count();
         for light in &scene.lights {
-            needs.varying_lights += usize::from(light.values.as_ref().is_some_and(Keys::varies));
+            needs.varying_lights += usize::from(light.values.as_deref().is_some_and(Keys::varies));
             needs.ranges += usize::from(light.range_m.is_some());
             needs.forced += usize::from(light.forced);
             match light.kind {

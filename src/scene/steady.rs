@@ -128,6 +128,9 @@ impl<T> Keys<T> {
 impl Node {
     /// Puts what channels say at all times in the place of the channels.
     pub fn settle(&mut self) {
+        if self.channels.is_empty() {
+            return;
+        }
         let Trs::Parts { translation, rotation, scale } = &mut self.local else { return };
         // A later channel of the same part would override what is settled: it stays, and so do both.
         let kinds: Vec<_> = self.channels.iter().map(std::mem::discriminant).collect();

@@ -115,7 +115,7 @@ mod tests {
         let light = Light {
             node: 0,
             kind,
-            values: Some(keys),
+            values: Some(keys.into()),
             range_m: None,
             forced: false,
             visibility: Visibility::default(),

@@ -24,14 +24,14 @@ impl Scene {
     /// is dark in one frame may shine in another.
     pub fn peak_rgb_of_light(&self, light: u32) -> Rgb {
         let light = &self.lights[light as usize];
-        light.values.as_ref().map_or_else(|| light.kind.rgb(), Keys::peak)
+        light.values.as_deref().map_or_else(|| light.kind.rgb(), Keys::peak)
     }
 
     /// The largest that each component of [`rgb_of_instance`](Self::rgb_of_instance) ever is.
     pub fn peak_rgb_of_instance(&self, instance: u32) -> Rgb {
         let instance = &self.instances[instance as usize];
         match self.material_of(instance.mesh) {
-            Some(material) => instance.values.as_ref().map_or(material.emission_nits, Keys::peak),
+            Some(material) => instance.values.as_deref().map_or(material.emission_nits, Keys::peak),
             None => Rgb::ZERO,
         }
     }

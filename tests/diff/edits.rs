@@ -312,14 +312,14 @@ fn what_changes_with_time_is_told() {
         values: vec![Vec3::splat(40.0), Vec3::splat(last)],
         interpolation: Interpolation::Linear,
     };
-    for diff in edited(|scene| scene.lights[POINT].values = Some(keys(10.0))) {
+    for diff in edited(|scene| scene.lights[POINT].values = Some(keys(10.0).into())) {
         assert_eq!(aspects(&diff, "point"), ["over_time"]);
         let over_time = Difference::OverTime { before: false, after: true, apart: None };
         assert_eq!(only(&diff).differences, [over_time]);
     }
     let [mut before, mut after] = [street(), street()];
-    before.lights[POINT].values = Some(keys(10.0));
-    after.lights[POINT].values = Some(keys(20.0));
+    before.lights[POINT].values = Some(keys(10.0).into());
+    after.lights[POINT].values = Some(keys(20.0).into());
     let found = diff(before, after);
     // From 40 to 10 or to 20 in frames 1 to 25: apart in all but the first.
     let Difference::OverTime { apart: Some(apart), .. } = only(&found).differences[0] else {
@@ -408,7 +408,7 @@ fn a_rename_is_no_removal() {
 #[test]
 fn another_instance_dirties_nothing_but_itself() {
     let all = edited(|scene| {
-        let gone = scene.instances.iter().position(|i| i.path == "/street/bulb_2").unwrap();
+        let gone = scene.instances.iter().position(|i| &*i.path == "/street/bulb_2").unwrap();
         scene.instances.remove(gone);
     });
     for diff in all {

@@ -64,7 +64,7 @@ fn row(edits: &[Edit]) -> Scene {
         }
     }
     let nodes = scene.nodes.iter().map(|node| node.path.clone()).collect::<Vec<_>>();
-    scene.lights.retain(|light| !removed.contains(&nodes[light.node as usize]));
+    scene.lights.retain(|light| !removed.contains(&nodes[light.node as usize].to_string()));
     scene
 }
 

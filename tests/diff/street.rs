@@ -89,14 +89,14 @@ pub fn at(place: [f64; 3], rotation: DQuat, scale: f64) -> Trs {
 /// The node of that name.
 pub fn node<'a>(scene: &'a mut Scene, name: &str) -> &'a mut Node {
     let path = format!("/street/{name}");
-    scene.nodes.iter_mut().find(|node| node.path == path).expect("there is such a node")
+    scene.nodes.iter_mut().find(|node| *node.path == path).expect("there is such a node")
 }
 
 /// Renames a prim.
 pub fn rename(scene: &mut Scene, name: &str, path: &str) {
     let old = format!("/street/{name}");
     node(scene, name).path = path.into();
-    scene.instances.iter_mut().filter(|i| i.path == old).for_each(|i| i.path = path.into());
+    scene.instances.iter_mut().filter(|i| *i.path == old).for_each(|i| i.path = path.into());
 }
 
 fn quad(material: u32) -> Mesh {

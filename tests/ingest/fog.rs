@@ -30,7 +30,7 @@ fn a_box_of_fog_stands_at_its_node() {
         region: Some(region),
     };
     assert_eq!(scene.medium, Some(expected));
-    assert_eq!(scene.nodes[1].path, "/root/lamp");
+    assert_eq!(&*scene.nodes[1].path, "/root/lamp");
     assert_eq!(scene.requirements().fog, 1);
     assert_eq!(scene.instances.len(), 1, "the node keeps its mesh");
     assert_eq!(scene.notes, []);

@@ -31,7 +31,7 @@ fn paths_follow_the_hierarchy_and_are_unique() {
     file.add("nodes", json!({"mesh": 0}));
     file.json["scenes"][0]["nodes"] = json!([1]);
     let scene = file.load().unwrap();
-    let paths: Vec<&str> = scene.nodes.iter().map(|node| node.path.as_str()).collect();
+    let paths: Vec<&str> = scene.nodes.iter().map(|node| &*node.path).collect();
     assert_eq!(paths, ["/World", "/World/lamp", "/World/lamp_2", "/World/node_3"]);
     assert_eq!(scene.instances.len(), 3);
     assert_eq!(scene.meshes.len(), 1, "nodes share the mesh");
@@ -47,7 +47,7 @@ fn usd_paths_are_the_prims() {
     file.add("nodes", json!({"name": "b", "mesh": 0}));
     file.json["scenes"][0]["nodes"] = json!([0, 1]);
     let scene = file.load().unwrap();
-    let paths: Vec<&str> = scene.instances.iter().map(|i| i.path.as_str()).collect();
+    let paths: Vec<&str> = scene.instances.iter().map(|i| &*i.path).collect();
     assert_eq!(paths, ["/World/Mesh/prim_0", "/World/Mesh/subset", "/b/prim_0", "/b/subset"]);
 }
 
@@ -101,7 +101,7 @@ fn gpu_instances_become_nodes() {
         "attributes": {"TRANSLATION": places, "ROTATION": turns},
     }});
     let scene = file.load().unwrap();
-    let paths: Vec<&str> = scene.instances.iter().map(|i| i.path.as_str()).collect();
+    let paths: Vec<&str> = scene.instances.iter().map(|i| &*i.path).collect();
     assert_eq!(paths, ["/lamp[0]", "/lamp[1]"]);
     assert_eq!(scene.meshes.len(), 1);
     let world = scene.pose_at(0.0).world(scene.instances[1].node);

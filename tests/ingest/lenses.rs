@@ -303,7 +303,7 @@ fn hidden_cameras_are_looked_through_last() {
         file.json["scenes"][0]["nodes"] = json!(nodes);
         let scene = load(&file);
         let camera = scene.default_camera().unwrap();
-        scene.nodes[camera.node as usize].path.clone()
+        scene.nodes[camera.node as usize].path.to_string()
     };
     let named = |name: &str| json!({ "name": name });
     let hidden = |name: &str| json!({"name": name, "extras": {"usdCamera": {"hidden": true}}});

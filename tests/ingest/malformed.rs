@@ -156,8 +156,8 @@ fn assert_promises_are_kept(scene: &candelabra::scene::Scene) {
         assert!(mesh.uv_sets.iter().all(|set| set.is_empty() || set.len() == count));
         assert!(mesh.material.is_none_or(|m| (m as usize) < scene.materials.len()));
     }
-    let keys = scene.lights.iter().filter_map(|light| light.values.as_ref());
-    for keys in keys.chain(scene.instances.iter().filter_map(|i| i.values.as_ref())) {
+    let keys = scene.lights.iter().filter_map(|light| light.values.as_deref());
+    for keys in keys.chain(scene.instances.iter().filter_map(|i| i.values.as_deref())) {
         assert!(!keys.times_s.is_empty() && keys.times_s.len() == keys.values.len());
         assert!(keys.times_s.is_sorted_by(|a, b| a < b));
         assert!(keys.values.iter().all(|v| v.is_finite() && v.min_element() >= 0.0));

@@ -88,13 +88,13 @@ fn nodes_that_are_no_forest() {
             "geometry: node 2: names a child twice; it is drawn once",
         ]
     );
-    let paths: Vec<&str> = scene.instances.iter().map(|i| i.path.as_str()).collect();
+    let paths: Vec<&str> = scene.instances.iter().map(|i| &*i.path).collect();
     assert_eq!(paths, ["/node_1/lamp", "/node_2/lamp"]);
     let scene = mends(Geometry, "scene", "below others", |f| {
         f.add("nodes", json!({"children": [0]}));
         f.json["scenes"][0]["nodes"] = json!([0, 1]);
     });
-    assert_eq!(scene.instances[0].path, "/node_1/lamp");
+    assert_eq!(&*scene.instances[0].path, "/node_1/lamp");
     let scene = mends(Geometry, "scene 0", "names a node twice", |f| {
         f.json["scenes"][0]["nodes"] = json!([0, 0]);
     });

@@ -26,7 +26,7 @@ fn objects_emit_by_their_material() {
          o room\nusemtl wall\nf 1 2 3\nf -1 -2 -3\n"
     );
     let scene = load_in(folder.path(), &obj).unwrap();
-    let paths: Vec<&str> = scene.instances.iter().map(|i| i.path.as_str()).collect();
+    let paths: Vec<&str> = scene.instances.iter().map(|i| &*i.path).collect();
     assert_eq!(paths, ["/lamp", "/room"]);
     let glow = &scene.materials[scene.meshes[0].material.unwrap() as usize];
     assert_eq!(glow.emission_nits, Vec3::new(3.0, 2.0, 1.0));

@@ -157,7 +157,7 @@ pub fn bar() -> File {
 fn a_bar_bends_at_its_joint() {
     let scene = load(&bar());
     assert_eq!(scene.notes, []);
-    assert_eq!(scene.instances[0].path, "/lamp");
+    assert_eq!(&*scene.instances[0].path, "/lamp");
     // Between the joints a vertex is half way between what they make of it.
     let expected = [
         Vec3::ZERO,

@@ -21,7 +21,7 @@ fn primitive(file: &mut File) -> &mut serde_json::Value {
 #[test]
 fn the_lamp_itself_is_good() {
     let scene = lamp().load().unwrap();
-    assert_eq!(scene.instances[0].path, "/lamp");
+    assert_eq!(&*scene.instances[0].path, "/lamp");
     assert_eq!(scene.materials[0].emission_nits.to_array(), [8.0, 4.0, 2.0]);
     assert_eq!(scene.notes, []);
 }

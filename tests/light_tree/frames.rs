@@ -140,8 +140,9 @@ fn the_scene_is_not_looked_at_in_other_frames() {
     let mut scene = scene_of(&street());
     let sign = scene.lights.iter_mut().find(|light| light.values.is_some()).unwrap();
     let values = vec![Vec3::ONE, Vec3::ONE, Vec3::splat(3.4e38)];
-    sign.values =
-        Some(Keys { times_s: vec![0.0, 0.1, 0.3], values, interpolation: Default::default() });
+    sign.values = Some(
+        Keys { times_s: vec![0.0, 0.1, 0.3], values, interpolation: Default::default() }.into(),
+    );
     let emitters = Emitters::collect(&scene);
     let beyond = FRAMES[4];
     assert!(pipeline::survey(&scene, &emitters, &FRAMES).is_err());

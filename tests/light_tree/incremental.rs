@@ -175,7 +175,7 @@ pub fn scene_of(prims: &[Prim]) -> Scene {
             scene.lights.push(Light {
                 node,
                 kind,
-                values: values.clone(),
+                values: values.clone().map(Box::new),
                 range_m: None,
                 forced,
                 visibility: Default::default(),
@@ -195,10 +195,10 @@ pub fn scene_of(prims: &[Prim]) -> Scene {
             Kind::Flame => 2,
         };
         scene.instances.push(Instance {
-            path,
+            path: path.into(),
             node,
             mesh,
-            values,
+            values: values.map(Box::new),
             shaping: None,
             forced,
             visibility: Default::default(),

@@ -108,7 +108,7 @@ fn street() -> Scene {
     let (tram, eye) = (scene.lights[TRAM].node as usize, eye as usize);
     scene.nodes[tram].channels = vec![Channel::Translation(keys([Vec3::ZERO, Vec3::X]))];
     scene.nodes[eye].channels = vec![Channel::Translation(keys([Vec3::ZERO, Vec3::X]))];
-    scene.lights[SIGN].values = Some(keys([Vec3::ONE, Vec3::splat(3.0)]));
+    scene.lights[SIGN].values = Some(keys([Vec3::ONE, Vec3::splat(3.0)]).into());
     scene
 }
 
@@ -136,13 +136,13 @@ fn move_node(
     path: &str,
     change: impl FnOnce(&mut DVec3, &mut DQuat, &mut DVec3),
 ) {
-    let node = scene.nodes.iter_mut().find(|node| node.path == path).unwrap();
+    let node = scene.nodes.iter_mut().find(|node| &*node.path == path).unwrap();
     let Trs::Parts { translation, rotation, scale } = &mut node.local else { unreachable!() };
     change(translation, rotation, scale);
 }
 
 fn channels<'a>(scene: &'a mut Scene, path: &str) -> &'a mut Vec<Channel> {
-    &mut scene.nodes.iter_mut().find(|node| node.path == path).unwrap().channels
+    &mut scene.nodes.iter_mut().find(|node| &*node.path == path).unwrap().channels
 }
 
 type Edits<T> = Vec<(&'static str, T, fn(&mut Scene))>;
@@ -207,7 +207,7 @@ fn an_edit_of_a_light_makes_it_stale_and_names_the_light() {
         ("moves", "/bulb", |s| {
             channels(s, "/bulb").push(Channel::Translation(keys([Vec3::ZERO, Vec3::X])));
         }),
-        ("varies", "/bulb", |s| s.lights[BULB].values = Some(keys([Vec3::ONE, Vec3::X]))),
+        ("varies", "/bulb", |s| s.lights[BULB].values = Some(keys([Vec3::ONE, Vec3::X]).into())),
         ("aim", "/torch", |s| {
             move_node(s, "/torch", |_, r, _| *r = DQuat::from_rotation_x(0.001));
         }),
@@ -245,7 +245,7 @@ fn an_edit_of_a_light_makes_it_stale_and_names_the_light() {
         }),
         ("halted", "/tram", |s| channels(s, "/tram").clear()),
         ("key", "/sign", |s| {
-            s.lights[SIGN].values = Some(keys([Vec3::ONE, Vec3::splat(3.1)]));
+            s.lights[SIGN].values = Some(keys([Vec3::ONE, Vec3::splat(3.1)]).into());
         }),
         ("stepped", "/sign", |s| {
             s.lights[SIGN].values.as_mut().unwrap().interpolation = Interpolation::Step;
@@ -264,7 +264,7 @@ fn an_edit_of_a_light_makes_it_stale_and_names_the_light() {
         ("vertex", "/neon", |s| s.meshes[NEON].positions[2].z = 0.01),
         ("a triangle less", "/neon", |s| s.meshes[NEON].triangles.truncate(3)),
         ("a triangle turned over", "/neon", |s| s.meshes[NEON].triangles[0].reverse()),
-        ("mesh varies", "/neon", |s| s.instances[NEON].values = Some(keys([Vec3::ONE; 2]))),
+        ("mesh varies", "/neon", |s| s.instances[NEON].values = Some(keys([Vec3::ONE; 2]).into())),
         ("mesh turns", "/neon", |s| {
             let values = vec![Quat::IDENTITY, Quat::from_rotation_x(1.0)];
             let (times_s, interpolation) = (vec![0.0, 0.1], Interpolation::Linear);

@@ -69,7 +69,7 @@ fn flames() -> Stage {
     morph(last(&mut stage), |place| 1.5 * Vec3::new(place.y, place.x, place.z));
     let values = [4.0, 0.0, 9.0].map(|nits| Vec3::new(nits, 1.0, nits)).into();
     let keys = Keys { times_s: vec![0.0, 0.5, 1.0], values, interpolation: Default::default() };
-    stage.scene.instances.last_mut().unwrap().values = Some(keys);
+    stage.scene.instances.last_mut().unwrap().values = Some(keys.into());
     stage
 }
 

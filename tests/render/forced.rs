@@ -18,12 +18,12 @@ const FRAME: i32 = 13;
 /// A room with a light of every kind, some of which move, and their paths.
 fn full_room() -> (Stage, Vec<(&'static str, String)>) {
     let mut stage = carousel();
-    let path_of_mesh = |stage: &Stage| stage.scene.instances.last().unwrap().path.clone();
+    let path_of_mesh = |stage: &Stage| stage.scene.instances.last().unwrap().path.to_string();
     let path_of_light =
         |stage: &Stage| stage.scene.light_path(stage.scene.lights.len() - 1).to_owned();
     let moving = stage.scene.moving_nodes();
     let moves = |node: u32| moving[node as usize];
-    let turning = stage.scene.instances.iter().find(|i| moves(i.node)).unwrap().path.clone();
+    let turning = stage.scene.instances.iter().find(|i| moves(i.node)).unwrap().path.to_string();
     let sinking = stage.scene.lights.iter().position(|light| moves(light.node)).unwrap();
     let mut paths = vec![
         ("a moving mesh", turning),
@@ -123,7 +123,7 @@ fn a_forced_light_is_never_among_the_picks_and_always_beside_them() {
     let paths: Vec<String> = paths.into_iter().map(|(_, path)| path).collect();
     force_lights(&mut stage.scene, &paths).unwrap();
     let set = Set::of(&stage.scene, &[FRAME]);
-    let is_forced = |emitter: u32| paths.contains(&set.emitters.light_of(emitter).path);
+    let is_forced = |emitter: u32| paths.contains(&set.emitters.light_of(emitter).path.to_string());
     let tree = set.tree.at_frame(FRAME).unwrap();
     // A sun and a dome are in no tree.
     assert_eq!(tree.forced_count(), paths.len() - 2);
@@ -201,7 +201,7 @@ fn lights_are_forced_by_path_or_by_what_they_are_below() {
         let lights = (0..scene.lights.len()).filter(|&row| scene.lights[row].forced);
         let lights = lights.map(|row| scene.light_path(row).to_owned());
         let meshes = scene.instances.iter().filter(|instance| instance.forced);
-        Ok(lights.chain(meshes.map(|instance| instance.path.clone())).collect())
+        Ok(lights.chain(meshes.map(|instance| instance.path.to_string())).collect())
     };
     assert_eq!(forced_by(&[]).unwrap(), [""; 0]);
     assert_eq!(forced_by(&["/hall/lamp"]).unwrap(), ["/hall/lamp"]);

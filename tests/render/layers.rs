@@ -306,7 +306,7 @@ fn mattes_cover_what_the_picture_covers_and_name_it() {
     let names: HashMap<u32, &String> =
         manifest.iter().map(|(name, id)| (u32::from_str_radix(id, 16).unwrap(), name)).collect();
     let known = |path: &str| {
-        stage.scene.instances.iter().any(|i| i.path == path) || path.starts_with("/node_")
+        stage.scene.instances.iter().any(|i| &*i.path == path) || path.starts_with("/node_")
     };
     assert!(names.len() > 3 && names.values().all(|name| known(name)), "{names:?}");
     let mut seen = BTreeMap::new();

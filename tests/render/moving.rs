@@ -87,9 +87,9 @@ fn frozen(stage: &mut Stage, frame: i32) {
 }
 
 /// Strengths at 0, 0.5 and 1 seconds.
-fn keys(values: [Vec3; 3]) -> Option<Keys<Vec3>> {
+fn keys(values: [Vec3; 3]) -> Option<Box<Keys<Vec3>>> {
     let times_s = vec![0.0, 0.5, 1.0];
-    Some(Keys { times_s, values: values.into(), interpolation: Interpolation::Linear })
+    Some(Box::new(Keys { times_s, values: values.into(), interpolation: Interpolation::Linear }))
 }
 
 /// A room in which a light of every kind flickers beside one that does not. Their constants are not

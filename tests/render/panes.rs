@@ -268,7 +268,7 @@ fn layers_show_the_pane_and_the_albedo_what_is_seen_through_it() {
         if let Some(glass) = glass {
             let node =
                 stage.quad([9.0; 2], glass, facing(DVec3::Z, DVec3::new(0.5, 0.0, 2.0))).node;
-            assert_eq!(stage.scene.nodes[node as usize].path, "/node_1");
+            assert_eq!(&*stage.scene.nodes[node as usize].path, "/node_1");
         }
         stage.look(DVec3::Z * 3.0, DVec3::ZERO, 0.2);
         let aovs = vec![

@@ -132,7 +132,7 @@ fn instances_may_shine_by_values_of_their_own() {
     let values =
         [[dim, bright, dark], [dark, dim, bright], [bright, dark, dim], [bright, dark, dark]];
     for (instance, values) in shades.zip(values) {
-        instance.values = Some(keys(values));
+        instance.values = Some(keys(values).into());
     }
     let set = Set::of(&stage.scene, &FRAMES);
     assert_eq!(set.emitters.changing_count(), 4 * SIDES as usize);
@@ -186,7 +186,7 @@ fn a_mesh_light_on_its_own_has_a_tree_of_its_own_only_if_it_changes() {
         if moves {
             lamp.node = node;
         }
-        lamp.values = varies.then(|| keys([1.0, 2.0, 0.5].map(Vec3::splat)));
+        lamp.values = varies.then(|| keys([1.0, 2.0, 0.5].map(Vec3::splat)).into());
         let set = Set::of(&stage.scene, &FRAMES);
         [TreeKind::Shared, TreeKind::Still, TreeKind::Frame].map(|kind| leaves(&set.tree, kind))
     };
@@ -290,7 +290,7 @@ fn lights_that_flicker_where_they_are_keep_their_bounds() {
         let intensity_cd = Vec3::splat(1.0);
         let light = stage.light(LightKind::Point { intensity_cd }, aimed(place, DVec3::Y * 9.0));
         let strength = |salt: f64| Vec3::splat((1.0 + (t * salt).sin()) as f32);
-        light.values = Some(keys([1.3, 3.7, 5.1].map(strength)));
+        light.values = Some(keys([1.3, 3.7, 5.1].map(strength)).into());
     }
     let set = Set::of(&stage.scene, &FRAMES);
     let frames = trees(&set.tree, TreeKind::Frame);

@@ -168,9 +168,9 @@ fn where_nothing_moves_a_shutter_changes_nothing() {
 }
 
 /// The strengths of the panel and of the bulb of a still room, step by step.
-fn lit(values: [f32; 2]) -> Option<Keys<Vec3>> {
+fn lit(values: [f32; 2]) -> Option<Box<Keys<Vec3>>> {
     let values = values.map(Vec3::splat).into();
-    Some(Keys { times_s: vec![0.0, 0.5], values, interpolation: Interpolation::Step })
+    Some(Box::new(Keys { times_s: vec![0.0, 0.5], values, interpolation: Interpolation::Step }))
 }
 
 /// Rays must find a lamp that is dark at first, and lose one that goes out, though nothing moves: it is all as if

@@ -155,7 +155,7 @@ impl Stage {
         let path = format!("/mesh_{}", self.scene.instances.len());
         let (values, shaping) = (None, None);
         self.scene.instances.push(Instance {
-            path,
+            path: path.into(),
             node,
             mesh,
             values,

@@ -3,7 +3,7 @@
 //! A channel that cannot be read is left out; one whose keys are only partly good keeps those.
 
 use super::accessors::Accessor;
-use super::document::{Document, Target, label};
+use super::document::{Document, Node, Target, label};
 use super::lenses::{self, YFOV, YMAG};
 use super::posing::Weights;
 use super::strengths::{COLOR, INTENSITY, Strength};
@@ -26,10 +26,13 @@ const LIGHTS: &str = "/extensions/KHR_lights_punctual/lights/";
 /// The path of a channel that animates morph targets.
 const WEIGHTS: &str = "weights";
 
+/// The channels of nodes, by their numbers in the file.
+pub(super) type Channels = BTreeMap<usize, Vec<Channel>>;
+
 /// What animations say of the nodes, cameras and lights of a file.
 pub(super) struct Animated {
-    /// The channels of every node.
-    pub channels: Vec<Vec<Channel>>,
+    /// The channels of the nodes that have any.
+    pub channels: Channels,
     /// Of the nodes whose weights of morph targets are animated.
     pub weights: BTreeMap<usize, Weights>,
     /// Of the cameras whose height is animated.
@@ -62,7 +65,7 @@ pub(super) struct Track {
 pub(super) fn compile(source: &Source, output: &mut Output) -> Result<Animated, Fault> {
     let document = source.document;
     let timeline = output.scene.timeline;
-    let mut channels: Vec<Vec<Channel>> = document.nodes.iter().map(|_| Vec::new()).collect();
+    let mut channels = Channels::new();
     let (mut weights, mut lenses) = (BTreeMap::new(), BTreeMap::new());
     let mut strengths: BTreeMap<usize, Strength> = BTreeMap::new();
     let mut moved = HashSet::new();
@@ -116,7 +119,8 @@ pub(super) fn compile(source: &Source, output: &mut Output) -> Result<Animated, 
                             Ok(())
                         }
                         Moved::Node(node) => {
-                            channels[node].push(channel(path, &mut track, values));
+                            let own = channel(path, &mut track, values);
+                            channels.entry(node).or_default().push(own);
                             Ok(())
                         }
                     };
@@ -154,16 +158,17 @@ impl Moved {
 
 /// Whether the file has such a part.
 fn can_move(document: &Document, moves: Moved, path: &str) -> bool {
-    let beside = &document.beside;
     match moves {
-        Moved::Node(node) => beside
-            .transforms
-            .get(node)
-            .is_some_and(|transform| path == WEIGHTS || transform.matrix.is_none()),
+        Moved::Node(node) => {
+            let can = |node: &Node| path == WEIGHTS || node.transform.matrix.is_none();
+            document.nodes.get(node).is_some_and(can)
+        }
         Moved::Camera(camera) if path == YFOV => {
             document.cameras.get(camera).is_some_and(|camera| camera.perspective.is_some())
         }
-        Moved::Camera(camera) => beside.magnifications.get(camera).is_some_and(Option::is_some),
+        Moved::Camera(camera) => {
+            document.beside.magnifications.get(camera).is_some_and(Option::is_some)
+        }
         Moved::Light(light) => light < document.light_count(),
     }
 }

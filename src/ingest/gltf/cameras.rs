@@ -3,12 +3,12 @@
 //! No camera is a reason to refuse a scene: most of what a scene is used for needs none. A number
 //! that makes no sense is mended and noted, and a camera that shows nothing is left out and noted.
 
-use super::document::{UsdCamera, reals};
+use super::document::{Node, UsdCamera, reals};
 use super::{Output, Source, lenses};
 use crate::ingest::error::Fault;
 use crate::ingest::notes::Notes;
 use crate::scene::{Camera, Category, LensKeys, Projection, Shutter};
-use gltf::json::{Camera as Row, Index, Node};
+use gltf::json::{Camera as Row, Index};
 use std::f32::consts::PI;
 use std::sync::Arc;
 

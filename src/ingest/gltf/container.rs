@@ -46,6 +46,16 @@ impl Container {
         &self.bytes[self.json.clone()]
     }
 
+    /// Without the JSON, once it is parsed, where that is all there is.
+    pub(super) fn parsed(mut self) -> Container {
+        if self.binary.is_none() {
+            self.json = 0..0;
+            self.bytes.truncate(MAGIC.len());
+            self.bytes.shrink_to_fit();
+        }
+        self
+    }
+
     pub(super) fn binary(&self) -> Option<&[u8]> {
         Some(&self.bytes[self.binary.clone()?])
     }

@@ -10,7 +10,10 @@ const DEEPEST: u32 = 512;
 
 /// The nodes of a file: for each its children, for the whole its roots.
 pub(super) struct Forest {
-    children: Vec<Vec<usize>>,
+    /// Of all nodes, one node's after the other's.
+    children: Vec<u32>,
+    /// Where those of each node end.
+    ends: Vec<u32>,
     pub roots: Vec<usize>,
 }
 
@@ -20,42 +23,48 @@ impl Forest {
     pub(super) fn new(document: &Document, notes: &mut Notes) -> Result<Forest, Fault> {
         let nodes = &document.nodes;
         let mut parents = vec![0u32; nodes.len()];
-        let mut children = vec![Vec::new(); nodes.len()];
+        let (mut children, mut ends) = (Vec::new(), Vec::with_capacity(nodes.len()));
         for (i, node) in nodes.iter().enumerate() {
             let mut note = |text| {
                 notes.add(Category::Geometry, label("node", i, node.name.as_deref()), text);
             };
-            let listed: Vec<usize> = node.children.iter().flatten().map(|c| c.value()).collect();
-            let mut known = listed.clone();
+            let mut known = node.children.to_vec();
             known.sort_unstable();
             known.dedup();
-            if known.len() < listed.len() {
+            if known.len() < node.children.len() {
                 note("names a child twice; it is drawn once");
             }
-            if known.last().is_some_and(|&last| last >= nodes.len()) {
+            if known.last().is_some_and(|&last| last as usize >= nodes.len()) {
                 note("has children that are not in the file; left out");
             }
             let mut taken = vec![false; known.len()];
-            for child in listed {
-                let Ok(at) = known.binary_search(&child) else { continue };
-                if child < nodes.len() && !std::mem::replace(&mut taken[at], true) {
-                    children[i].push(child);
-                    parents[child] += 1;
+            for child in &node.children {
+                let Ok(at) = known.binary_search(child) else { continue };
+                let is_first = !std::mem::replace(&mut taken[at], true);
+                if let Some(parents) = parents.get_mut(*child as usize).filter(|_| is_first) {
+                    children.push(*child);
+                    *parents += 1;
                 }
             }
+            ends.push(children.len() as u32);
         }
         for (i, _) in parents.iter().enumerate().filter(|(_, parents)| **parents > 1) {
             let object = label("node", i, nodes[i].name.as_deref());
             let text = "is the child of several nodes; it is drawn below each";
             notes.add(Category::Geometry, object, text);
         }
-        let forest = Forest { children, roots: roots(document, &parents, notes) };
+        let forest = Forest { children, ends, roots: roots(document, &parents, notes) };
         forest.check_depth(document, parents)?;
         Ok(forest.without_repeated_roots(notes))
     }
 
-    pub(super) fn children(&self, node: usize) -> &[usize] {
-        &self.children[node]
+    pub(super) fn children(
+        &self,
+        node: usize,
+    ) -> impl ExactSizeIterator<Item = usize> + DoubleEndedIterator {
+        let start = node.checked_sub(1).map_or(0, |before| self.ends[before]);
+        let own = &self.children[start as usize..self.ends[node] as usize];
+        own.iter().map(|&child| child as usize)
     }
 
     /// Goes down from the nodes without a parent, each node after all its parents.
@@ -70,7 +79,7 @@ impl Forest {
                 let problem = format!("has more than {DEEPEST} ancestors");
                 return Err(Fault::new(object(i), problem).remedy("flatten the hierarchy"));
             }
-            for &child in &self.children[i] {
+            for child in self.children(i) {
                 depths[child] = depths[child].max(depths[i] + 1);
                 parents[child] -= 1;
                 if parents[child] == 0 {
@@ -89,10 +98,10 @@ impl Forest {
 
     /// A root that another root stands above is drawn below that one only.
     fn without_repeated_roots(mut self, notes: &mut Notes) -> Forest {
-        let mut below = vec![false; self.children.len()];
+        let mut below = vec![false; self.ends.len()];
         let mut open: Vec<usize> = self.roots.clone();
         while let Some(node) = open.pop() {
-            for &child in &self.children[node] {
+            for child in self.children(node) {
                 if !std::mem::replace(&mut below[child], true) {
                     open.push(child);
                 }

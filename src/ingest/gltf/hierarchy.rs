@@ -1,7 +1,7 @@
 //! Nodes, parents first, and what stands at them.
 
-use super::animation::{self, Animated};
-use super::document::{Real, Transform, UsdFog, UsdLux, label, usd_path};
+use super::animation::{self, Animated, Channels};
+use super::document::{Node as Row, Real, Transform, UsdFog, UsdLux, label, usd_path};
 use super::geometry::{Compiled, Meshes};
 use super::lights::{self, Placed};
 use super::links::LinkTable;
@@ -13,7 +13,7 @@ use crate::ingest::error::Fault;
 use crate::ingest::paths::{PrimPaths, component};
 use crate::scene::{Category, Channel, Instance, LensKeys, Light, Links, Node, Trs};
 use glam::{DAffine3, DMat4, DQuat, DVec3};
-use gltf::json::{Index, Mesh, Node as Row};
+use gltf::json::{Index, Mesh};
 use std::collections::{BTreeMap, HashMap};
 use std::mem;
 use std::sync::Arc;
@@ -43,7 +43,7 @@ struct Hanging {
 /// What grows while the hierarchy is walked.
 struct Walk<'a> {
     source: &'a Source<'a>,
-    channels: Vec<Vec<Channel>>,
+    channels: Channels,
     /// By camera of the file.
     lenses: BTreeMap<usize, Arc<LensKeys>>,
     /// By light of the file.
@@ -73,11 +73,14 @@ pub(super) fn compile(source: &Source, output: &mut Output) -> Result<(), Fault>
         hanging: Vec::new(),
         placed: vec![None; source.document.nodes.len()],
         meshes: Meshes::new(source),
-        paths: PrimPaths::default(),
+        paths: PrimPaths::with_room(source.document.nodes.len()),
         links: LinkTable::default(),
         profiles: Profiles::default(),
         uniform: Vec::new(),
     };
+    let rows = &source.document.nodes;
+    output.scene.nodes.reserve_exact(rows.len());
+    output.scene.lights.reserve_exact(rows.iter().filter(|row| row.light.is_some()).count());
     // A stack, so that no depth of the hierarchy is a depth of calls.
     if let Some((number, scene)) = source.document.default_scene() {
         fog::of_scene(output, number, scene)?;
@@ -90,21 +93,21 @@ pub(super) fn compile(source: &Source, output: &mut Output) -> Result<(), Fault>
         let visible = visible && !source.document.beside.hidden.contains(&number);
         let node = walk.place(output, number, row, parent)?;
         let object = label("node", number, row.name.as_deref());
-        if let Some(camera) = row.camera {
+        if let Some(camera) = row.camera() {
             let camera = (camera, walk.lenses.get(&camera.value()));
             cameras::compile(source, output, camera, row, (node, !visible), &object)?;
         }
         if visible {
             walk.furnish(output, number, row, node, &object)?;
         } else if row.mesh.is_some()
-            || source.document.light_at(number).is_some()
+            || row.light.is_some()
             || UsdFog::of(&row.extras, &object)?.is_some()
         {
             // The file says that it is not to be seen: nothing is lost.
             output.notes.add(Category::Other, object, "is hidden (KHR_node_visibility); left out");
         }
-        let children = source.forest.children(number).iter().rev();
-        stack.extend(children.map(|&child| open(child, Some(node), visible)));
+        let children = source.forest.children(number).rev();
+        stack.extend(children.map(|child| open(child, Some(node), visible)));
     }
     walk.hang(output)?;
     walk.links.finish(output)
@@ -129,7 +132,7 @@ impl Walk<'_> {
         };
         let object = || label("node", number, row.name.as_deref());
         let channels = match self.placed[number] {
-            None => mem::take(&mut self.channels[number]),
+            None => self.channels.remove(&number).unwrap_or_default(),
             // Below another parent it moves alike.
             Some(first) => {
                 let channels = &output.scene.nodes[first as usize].channels;
@@ -138,16 +141,22 @@ impl Walk<'_> {
                 channels.clone()
             }
         };
-        let local = local(&self.source.document.beside.transforms[number], |text| {
+        let local = local(&row.transform, |text| {
             output.notes.add(Category::Geometry, object(), text);
         });
-        let node = self.push(output, Node { path, parent, local, channels })?;
+        let node = self.push(output, &path, parent, (local, channels))?;
         self.placed[number].get_or_insert(node);
         Ok(node)
     }
 
-    fn push(&mut self, output: &mut Output, mut node: Node) -> Result<u32, Fault> {
-        node.path = self.paths.claim(node.path);
+    fn push(
+        &mut self,
+        output: &mut Output,
+        path: &str,
+        parent: Option<u32>,
+        (local, channels): (Trs, Vec<Channel>),
+    ) -> Result<u32, Fault> {
+        let mut node = Node { path: self.paths.claim(path), parent, local, channels };
         node.settle();
         let bytes = size_of::<Node>() + 2 * node.path.len();
         output.budget.take(bytes as u64, || "nodes".to_string())?;
@@ -183,7 +192,7 @@ impl Walk<'_> {
         let shaping = self.profiles.shaping(self.source, output, lux.as_ref(), object)?;
         let told = (lux.as_ref(), shaping);
         let mut light = lights::of_node(self.source, output, number, told, node, object)?
-            .map(|light| Light { values: values.take(), ..light });
+            .map(|light| Light { values: values.take().map(Box::new), ..light });
         if let Some(light) = &mut light {
             lights::animate(self.source, output, number, light, &self.strengths)?;
         }
@@ -236,7 +245,7 @@ impl Walk<'_> {
         };
         for (i, local) in locals.into_iter().enumerate() {
             let path = format!("{}[{i}]", output.scene.nodes[node as usize].path);
-            let child = self.push(output, Node::fixed(path, Some(node), local))?;
+            let child = self.push(output, &path, Some(node), (local, Vec::new()))?;
             // The light of a node is not its instances'.
             let placed = Placed { has_light: false, ..placed };
             self.put_mesh(output, mesh, child, &placed, &pose)?;
@@ -280,9 +289,9 @@ impl Walk<'_> {
             let own = usd_path(&row.primitives[i].extras);
             let own = own.as_deref().and_then(|path| path.rsplit('/').next());
             let path = match own {
-                Some(own) => self.paths.claim(format!("{above}/{own}")),
-                None if row.primitives.len() > 1 => self.paths.claim(format!("{above}/prim_{i}")),
-                None if placed.has_light => self.paths.claim(format!("{above}/mesh")),
+                Some(own) => self.paths.claim(&format!("{above}/{own}")),
+                None if row.primitives.len() > 1 => self.paths.claim(&format!("{above}/prim_{i}")),
+                None if placed.has_light => self.paths.claim(&format!("{above}/mesh")),
                 None => above,
             };
             let Placed { shaping, forced, visibility, links, .. } = *placed;
@@ -320,7 +329,8 @@ impl Walk<'_> {
                 None => {
                     let path = format!("{}/posed", output.scene.nodes[from as usize].path);
                     let parent = hung.below.and_then(|row| self.placed[row]);
-                    let node = self.push(output, Node::fixed(path, parent, Trs::default()))?;
+                    let still = (Trs::default(), Vec::new());
+                    let node = self.push(output, &path, parent, still)?;
                     keep_group(output, from, node)?;
                     *known.entry(key).or_insert(node)
                 }
@@ -337,7 +347,7 @@ fn keep_group(output: &mut Output, of: u32, node: u32) -> Result<(), Fault> {
     let mut above = std::iter::successors(Some(of), |&node| scene.nodes[node as usize].parent);
     if let Some(group) = above.find_map(|node| scene.light_groups.get(&node)).cloned() {
         let bytes = size_of::<(u32, String)>() + group.len();
-        output.budget.take(bytes as u64, || scene.nodes[node as usize].path.clone())?;
+        output.budget.take(bytes as u64, || scene.nodes[node as usize].path.to_string())?;
         scene.light_groups.insert(node, group);
     }
     Ok(())
@@ -345,7 +355,7 @@ fn keep_group(output: &mut Output, of: u32, node: u32) -> Result<(), Fault> {
 
 /// The transform of a node. Whatever it says can be composed; what had to be mended is noted.
 pub(super) fn local(row: &Transform, mut note: impl FnMut(&'static str)) -> Trs {
-    if let Some(matrix) = row.matrix {
+    if let Some(matrix) = row.matrix.as_deref() {
         let columns = matrix.map(|value| value.f64());
         let last_row = [columns[3], columns[7], columns[11], columns[15] - 1.0];
         if last_row.iter().any(|part| part.abs() > AFFINE_TOLERANCE) {
@@ -357,7 +367,8 @@ pub(super) fn local(row: &Transform, mut note: impl FnMut(&'static str)) -> Trs 
         return Trs::Matrix(DAffine3::from_mat4(DMat4::from_cols_array(&columns)));
     }
     let vector = |values: [Real; 3]| DVec3::from(values.map(|value| value.f64()));
-    let rotation = row.rotation.map(|parts| DQuat::from_array(parts.map(|part| part.f64())));
+    let rotation =
+        row.rotation.as_deref().map(|parts| DQuat::from_array(parts.map(|part| part.f64())));
     let rotation = rotation.unwrap_or(DQuat::IDENTITY);
     let length = rotation.length();
     if (length - 1.0).abs() > QUATERNION_TOLERANCE {
@@ -369,6 +380,6 @@ pub(super) fn local(row: &Transform, mut note: impl FnMut(&'static str)) -> Trs 
     Trs::Parts {
         translation: row.translation.map_or(DVec3::ZERO, vector),
         rotation: if has_direction { rotation / length } else { DQuat::IDENTITY },
-        scale: row.scale.map_or(DVec3::ONE, vector),
+        scale: row.scale.as_deref().copied().map_or(DVec3::ONE, vector),
     }
 }

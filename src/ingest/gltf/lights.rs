@@ -49,10 +49,10 @@ impl Placed<'_> {
     }
 
     /// A copy of the values for one more light.
-    pub(super) fn copy_values(&self, output: &mut Output) -> Result<Option<Keys<Rgb>>, Fault> {
+    pub(super) fn copy_values(&self, output: &mut Output) -> Result<Option<Box<Keys<Rgb>>>, Fault> {
         let bytes = self.values.map_or(0, |keys| keys.times_s.len() * size_of::<(f32, Rgb)>());
         output.budget.take(bytes as u64, || self.object.to_string())?;
-        Ok(self.values.cloned())
+        Ok(self.values.cloned().map(Box::new))
     }
 }
 
@@ -70,7 +70,7 @@ pub(super) fn of_node(
     if let Some(lux) = lux.filter(|lux| lux.kind == "DomeLight") {
         return Ok(dome(source, output, lux, object)?.map(|kind| light(kind, None)));
     }
-    let Some(index) = source.document.light_at(number) else {
+    let Some(index) = source.document.nodes[number].light else {
         if let Some(lux) = lux.filter(|_| source.document.nodes[number].mesh.is_none()) {
             let text = format!("a {} has no carrier in glTF; left out", lux.kind);
             output.notes.add(Category::Lights, object, text);
@@ -105,7 +105,9 @@ pub(super) fn animate(
     strengths: &BTreeMap<usize, Strength>,
 ) -> Result<(), Fault> {
     let is_other = light.values.is_some() || matches!(light.kind, LightKind::Dome { .. });
-    let Some(index) = source.document.light_at(number).filter(|_| !is_other) else { return Ok(()) };
+    let Some(index) = source.document.nodes[number].light.filter(|_| !is_other) else {
+        return Ok(());
+    };
     let (Some(row), Some(strength)) = (source.document.get(index), strengths.get(&index.value()))
     else {
         return Ok(());
@@ -115,7 +117,7 @@ pub(super) fn animate(
         Some(keys) => {
             let bytes = keys.times_s.len() * size_of::<(f32, Rgb)>();
             output.budget.take(bytes as u64, || object.clone())?;
-            light.values = Some(keys);
+            light.values = Some(Box::new(keys));
         }
         None => {
             let text = "is too strong for a 32-bit number at some time; it is constant";

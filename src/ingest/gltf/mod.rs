@@ -81,6 +81,7 @@ pub(super) fn load(path: &Path, must_be_glb: bool) -> Result<Scene, Fault> {
     let folder = Folder::of(path)?;
     budget.grow(file.size() as u64);
     let document = Document::parse(file.json(), &mut budget, &mut notes)?;
+    let file = file.parsed();
     extensions::check(&document, &mut notes)?;
     let forest = Forest::new(&document, &mut notes)?;
     let buffers = Buffers::read(&document, &file, &folder)?;

@@ -61,7 +61,7 @@ pub(super) fn load(path: &Path) -> Result<Scene, Fault> {
     let mut cutter = Cutter::new();
     for (i, group) in model.groups.iter().enumerate() {
         let object = format!("object {i} {:?}", group.name);
-        let path = paths.claim(format!("/{}", component(&group.name, || format!("object_{i}"))));
+        let path = paths.claim(&format!("/{}", component(&group.name, || format!("object_{i}"))));
         let rows = size_of::<Mesh>() + size_of::<Node>() + size_of::<Instance>() + 4 * path.len();
         budget.take(rows as u64, || object.clone())?;
         let Some(mut mesh) = compile(&model, group, &mut cutter, &object, &mut notes) else {

@@ -294,7 +294,7 @@ impl<'a> Drawing<'a> {
             ..Default::default()
         };
         let instance = |mesh: u32| Instance {
-            path: String::new(),
+            path: "".into(),
             node: 0,
             mesh,
             values: None,

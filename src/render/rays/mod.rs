@@ -166,7 +166,7 @@ fn may_shine(scene: &Scene, instance: u32) -> bool {
 /// The place of each instance in the order of paths.
 fn ranks(instances: &[Instance]) -> Vec<u32> {
     let mut order: Vec<u32> = (0..instances.len() as u32).collect();
-    order.par_sort_by_key(|&row| instances[row as usize].path.as_str());
+    order.par_sort_by_key(|&row| &*instances[row as usize].path);
     let mut ranks = vec![0; instances.len()];
     for (rank, row) in (0..).zip(order) {
         ranks[row as usize] = rank;

@@ -11,6 +11,7 @@ use crate::scene::{
     AlphaMode, Channel, Interpolation, Keys, Light, LightKind, Material, Node, Trs,
 };
 use glam::{DQuat, DVec3, Quat, Vec2};
+use std::sync::Arc;
 
 const ALL: fn(u32, u32, Vec2) -> bool = |_, _, _| true;
 
@@ -54,8 +55,8 @@ fn mesh(triangles: &[[Vec3; 3]]) -> Mesh {
 fn scene(meshes: Vec<Mesh>, placed: &[(u32, Trs)]) -> Scene {
     let mut scene = Scene { meshes, ..Default::default() };
     for (i, &(mesh, local)) in placed.iter().enumerate() {
-        let path = format!("/prim_{i}");
-        scene.nodes.push(Node::fixed(&path, None, local));
+        let path: Arc<str> = format!("/prim_{i}").into();
+        scene.nodes.push(Node::fixed(path.clone(), None, local));
         scene.instances.push(Instance {
             path,
             node: i as u32,

@@ -1,6 +1,6 @@
 //! What a file says and the `gltf` crate's types do not, or not well enough.
 
-use super::{Real, Row};
+use super::{Real, Row, Transform};
 use gltf::json::animation::Sampler;
 use gltf::json::mesh::Semantic;
 use gltf::json::validation::Checked;
@@ -12,13 +12,11 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::error::Error;
 use std::mem;
 
-type Prepared = Result<(), Box<dyn Error>>;
+type Prepared<T = ()> = Result<T, Box<dyn Error>>;
 
 /// What was taken out, by the number of the object.
 #[derive(Default)]
 pub(in crate::ingest::gltf) struct Beside {
-    /// Of every node, in double precision: large translations cancel and leave small ones.
-    pub transforms: Vec<Transform>,
     /// `EXT_mesh_gpu_instancing` of nodes.
     pub instances: BTreeMap<usize, Instancing>,
     /// Nodes that `KHR_node_visibility` hides.
@@ -29,14 +27,6 @@ pub(in crate::ingest::gltf) struct Beside {
     pub magnifications: Vec<Option<Magnification>>,
     /// Channels of every animation: the crate's need a node and have no `KHR_animation_pointer`.
     pub channels: Vec<Vec<Channel>>,
-}
-
-/// A node's place below its parent.
-pub(in crate::ingest::gltf) struct Transform {
-    pub matrix: Option<[Real; 16]>,
-    pub translation: Option<[Real; 3]>,
-    pub rotation: Option<[Real; 4]>,
-    pub scale: Option<[Real; 3]>,
 }
 
 /// What an orthographic camera sees, from the middle to the edge.
@@ -84,15 +74,15 @@ pub(in crate::ingest::gltf) struct Pointer {
 }
 
 impl Beside {
-    /// Takes from a row what is kept beside it. A row may come twice, the second time as what stands for it.
-    pub(super) fn node(&mut self, row: &mut Row, number: usize) -> Prepared {
+    /// Takes from a row what is kept beside it, and its transform. A row may come twice, the second time as what stands
+    /// for it.
+    pub(super) fn node(&mut self, row: &mut Row, number: usize) -> Prepared<Transform> {
         let transform = Transform {
             matrix: take(row, "matrix")?,
             translation: take(row, "translation")?,
             rotation: take(row, "rotation")?,
             scale: take(row, "scale")?,
         };
-        put(&mut self.transforms, number, transform);
         self.instances.remove(&number);
         self.hidden.remove(&number);
         if let Some(extensions) = row.get_mut("extensions").and_then(Value::as_object_mut) {
@@ -102,7 +92,7 @@ impl Beside {
             let visible = visibility.and_then(|visibility| visibility.visible).unwrap_or(true);
             self.hidden.extend((!visible).then_some(number));
         }
-        Ok(())
+        Ok(transform)
     }
 
     pub(super) fn material(&mut self, row: &mut Row, number: usize) -> Prepared {

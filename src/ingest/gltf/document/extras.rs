@@ -4,9 +4,10 @@ use super::Real;
 use crate::ingest::error::Fault;
 use gltf::json::Extras;
 use serde::Deserialize;
-use serde::de::DeserializeOwned;
+use serde::de::{DeserializeOwned, Deserializer, IgnoredAny, MapAccess, Visitor};
 use serde_json::value::RawValue;
-use std::collections::HashMap;
+use std::borrow::Cow;
+use std::fmt;
 
 /// `asset.extras.usd`: the clock of the stage.
 #[derive(Deserialize)]
@@ -216,6 +217,32 @@ fn member<T: DeserializeOwned>(
 
 /// The text of a member; extras that are no object have none.
 fn raw<'a>(extras: &'a Extras, key: &str) -> Option<&'a str> {
-    let members: HashMap<String, &RawValue> = serde_json::from_str(extras.as_ref()?.get()).ok()?;
-    Some(members.get(key)?.get())
+    let mut json = serde_json::Deserializer::from_str(extras.as_ref()?.get());
+    json.deserialize_map(Member(key)).ok()?.map(RawValue::get)
 }
+
+/// Looks for a member of an object by its name, without keeping the others; of several, the last.
+struct Member<'k>(&'k str);
+
+impl<'de> Visitor<'de> for Member<'_> {
+    type Value = Option<&'de RawValue>;
+
+    fn expecting(&self, formatter: &mut fmt::Formatter) -> fmt::Result {
+        formatter.write_str("an object")
+    }
+
+    fn visit_map<A: MapAccess<'de>>(self, mut members: A) -> Result<Self::Value, A::Error> {
+        let mut found = None;
+        while let Some(name) = members.next_key::<Name>()? {
+            match name.0 == self.0 {
+                true => found = Some(members.next_value()?),
+                false => drop(members.next_value::<IgnoredAny>()?),
+            }
+        }
+        Ok(found)
+    }
+}
+
+/// A member's name, copied only if it is escaped.
+#[derive(Deserialize)]
+struct Name<'a>(#[serde(borrow)] Cow<'a, str>);

@@ -6,13 +6,15 @@
 
 mod beside;
 mod extras;
+mod node;
 mod real;
 mod reference;
 
-pub(super) use beside::{Beside, Instancing, Target, Transform};
+pub(super) use beside::{Beside, Instancing, Target};
 pub(super) use extras::{
     AssetUsd, UsdCamera, UsdFog, UsdIes, UsdLens, UsdLinks, UsdLux, UsdValues, usd_path,
 };
+pub(super) use node::{Node, Transform};
 pub(super) use real::{Real, reals};
 
 use crate::ingest::budget::Budget;
@@ -21,9 +23,9 @@ use crate::ingest::notes::Notes;
 use crate::scene::Category;
 use gltf::json::asset::Asset;
 use gltf::json::extensions::root::{KhrLightsPunctual, Root as RootExtensions};
-use gltf::json::extensions::scene::khr_lights_punctual::Light;
 use gltf::json::mesh::Primitive;
 use gltf::json::{Image, Index, Root, Scene, Texture};
+use rayon::prelude::*;
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
 use serde_json::value::RawValue;
@@ -35,6 +37,8 @@ use std::ops::Deref;
 
 /// More JSON than this is not parsed.
 const MOST_JSON_BYTES: usize = 512 << 20;
+/// So many nodes are parsed side by side.
+const BLOCK: usize = 1 << 14;
 
 /// An object of the file that is not parsed yet.
 type Row = Map<String, Value>;
@@ -42,6 +46,7 @@ type Row = Map<String, Value>;
 /// The file's JSON, typed, and nothing that it implies.
 pub(super) struct Document {
     root: Root,
+    pub nodes: Vec<Node>,
     pub beside: Beside,
 }
 
@@ -99,6 +104,7 @@ impl Document {
         let skin = Kind("skin", Category::Animation, r#"{"joints": []}"#);
         let scene = Kind("scene", Category::Geometry, r#"{"nodes": []}"#);
         let plain = |_: &mut Row, _| Ok(());
+        let nodes = tables.nodes(&node, &mut beside)?;
         let root = Root {
             asset,
             extensions_used: tables.optional("extensionsUsed")?.unwrap_or_default(),
@@ -109,7 +115,6 @@ impl Document {
             }),
             scene: tables.optional("scene")?.map(Index::new),
             scenes: tables.table("scenes", &scene, |row, _| beside::scene(row))?,
-            nodes: tables.table("nodes", &node, |row, i| beside.node(row, i))?,
             meshes: tables.table("meshes", &mesh, |row, _| beside::mesh(row))?,
             accessors: tables.table("accessors", &accessor, |row, _| beside::accessor(row))?,
             buffer_views: tables.table("bufferViews", &view, plain)?,
@@ -124,7 +129,7 @@ impl Document {
                 .table("animations", &animation, |row, i| beside.animation(row, i))?,
             ..Root::default()
         };
-        Ok(Document { root, beside })
+        Ok(Document { root, nodes, beside })
     }
 
     /// The scene that is read, and its number: the default if it is there, else the first.
@@ -139,12 +144,6 @@ impl Document {
         let extensions = self.extensions.as_ref();
         let punctual = extensions.and_then(|all| all.khr_lights_punctual.as_ref());
         punctual.map_or(0, |punctual| punctual.lights.len())
-    }
-
-    /// The light at a node.
-    pub(super) fn light_at(&self, node: usize) -> Option<Index<Light>> {
-        let extensions = self.nodes[node].extensions.as_ref()?;
-        extensions.khr_lights_punctual.as_ref().map(|punctual| punctual.light)
     }
 }
 
@@ -191,40 +190,73 @@ impl<'a> Tables<'a, '_> {
         kind: &Kind,
         mut prepare: impl FnMut(&mut Row, usize) -> Result<(), Box<dyn Error>>,
     ) -> Result<Vec<T>, Fault> {
-        let Kind(name, category, spare) = *kind;
+        let rows = self.rows(key, kind, size_of::<T>())?;
+        let row = |(i, row): (usize, &&RawValue)| Ok(self.row(row, kind, i, &mut prepare)?.0);
+        rows.iter().enumerate().map(row).collect()
+    }
+
+    /// Parses the nodes.
+    fn nodes(&mut self, kind: &Kind, beside: &mut Beside) -> Result<Vec<Node>, Fault> {
+        let rows = self.rows("nodes", kind, size_of::<Node>())?;
+        let plain = |row: &&RawValue| Node::plain(row.get());
+        let mut nodes = Vec::with_capacity(rows.len());
+        for block in rows.chunks(BLOCK) {
+            let read: Vec<Option<Node>> = block.par_iter().map(plain).collect();
+            for (node, row) in read.into_iter().zip(block) {
+                let node = match node {
+                    Some(node) => node,
+                    None => {
+                        let number = nodes.len();
+                        let prepare = |row: &mut Row, number| beside.node(row, number);
+                        let (row, transform) = self.row(row, kind, number, prepare)?;
+                        Node::of(row, transform)
+                    }
+                };
+                nodes.push(node);
+            }
+        }
+        Ok(nodes)
+    }
+
+    /// The rows of a table, each of which will take so many bytes; none if it is no table.
+    fn rows(&mut self, key: &str, kind: &Kind, bytes: usize) -> Result<Vec<&'a RawValue>, Fault> {
         let rows: Vec<&RawValue> = match self.optional(key) {
             Ok(rows) => rows.unwrap_or_default(),
             Err(fault) => {
                 let text = format!("{}; all are left out", fault.into_problem());
-                self.notes.add(category, key, text);
+                self.notes.add(kind.1, key, text);
                 return Ok(Vec::new());
             }
         };
-        let text: u64 = rows.iter().map(|row| weight(row.get())).sum();
-        self.budget.take(text + (rows.len() * size_of::<T>()) as u64, || key.to_string())?;
-        let mut parse = |json: &str, i: usize| -> Result<T, Fault> {
+        let text: u64 = rows.par_iter().map(|row| weight(row.get())).sum();
+        self.budget.take(text + (rows.len() * bytes) as u64, || key.to_string())?;
+        Ok(rows)
+    }
+
+    /// Parses a row after it has been prepared, or what stands for it.
+    fn row<T: DeserializeOwned, P>(
+        &mut self,
+        row: &RawValue,
+        kind: &Kind,
+        i: usize,
+        mut prepare: impl FnMut(&mut Row, usize) -> Result<P, Box<dyn Error>>,
+    ) -> Result<(T, P), Fault> {
+        let Kind(name, category, spare) = *kind;
+        let mut parse = |json: &str| -> Result<(T, P), Fault> {
             let mut value: Value =
                 serde_json::from_str(json).map_err(|e| Fault::new(label(name, i, None), e))?;
             let own = value.get("name").and_then(Value::as_str).map(String::from);
             let fault = |problem: &dyn Display| Fault::new(label(name, i, own.as_deref()), problem);
             let row = value.as_object_mut().ok_or_else(|| fault(&"is not an object"))?;
             reference::check(row).map_err(|problem| fault(&problem))?;
-            prepare(row, i).map_err(|problem| fault(&problem))?;
-            T::deserialize(value).map_err(|error| fault(&error))
+            let prepared = prepare(row, i).map_err(|problem| fault(&problem))?;
+            Ok((T::deserialize(value).map_err(|error| fault(&error))?, prepared))
         };
-        let mut parsed = Vec::with_capacity(rows.len());
-        for (i, row) in rows.into_iter().enumerate() {
-            let row = match parse(row.get(), i) {
-                Ok(row) => row,
-                Err(fault) => {
-                    let (object, problem) = fault.parts();
-                    self.notes.add(category, object, format!("{problem}; left out"));
-                    parse(spare, i)?
-                }
-            };
-            parsed.push(row);
-        }
-        Ok(parsed)
+        parse(row.get()).or_else(|fault| {
+            let (object, problem) = fault.parts();
+            self.notes.add(category, object, format!("{problem}; left out"));
+            parse(spare)
+        })
     }
 }
 

@@ -29,16 +29,17 @@ mod weights;
 
 pub(super) use weights::Weights;
 
+use super::animation::Channels;
 use super::attributes::Attributes;
-use super::document::{label, morph_targets};
+use super::document::{Node, label, morph_targets};
 use super::geometry::Vertices;
 use super::{Output, Source};
 use crate::ingest::error::Fault;
-use crate::scene::{Category, Channel, Deformation, Mesh, Shape};
+use crate::scene::{Category, Deformation, Mesh, Shape};
 use glam::{Vec3, Vec4};
 use gltf::json::mesh::{Primitive, Semantic};
 use gltf::json::validation::Checked;
-use gltf::json::{Index, Mesh as Row, Node};
+use gltf::json::{Index, Mesh as Row};
 use rig::Rig;
 use std::collections::BTreeMap;
 
@@ -90,7 +91,7 @@ impl Poses {
     pub(super) fn new(
         source: &Source,
         output: &mut Output,
-        channels: &[Vec<Channel>],
+        channels: &Channels,
         weights: BTreeMap<usize, Weights>,
     ) -> Result<Poses, Fault> {
         Ok(Poses { rig: Rig::new(source, output, channels)?, weights })
@@ -107,14 +108,14 @@ impl Poses {
         let mesh = &source.document.meshes[mesh.value()];
         let mut pose = Pose::default();
         if mesh.primitives.iter().any(is_bound) {
-            pose.skin = node.skin.map(|skin| skin.value());
+            pose.skin = node.skin().map(|skin| skin.value());
         }
         if mesh.primitives.iter().any(|primitive| morph_targets(primitive) > 0) {
             let animated = self.weights.get(&number);
             let varies = animated.is_some_and(|weights| !weights.keys.is_empty());
             pose.animated = varies.then_some(number);
             let first = animated.map(|weights| &weights.first);
-            let weights = first.or(node.weights.as_ref()).or(mesh.weights.as_ref());
+            let weights = first.or(node.weights()).or(mesh.weights.as_ref());
             let is_needed =
                 |weights: &&Vec<f32>| varies || weights.iter().any(|&weight| weight != 0.0);
             let weights = weights.filter(is_needed);

@@ -1,10 +1,10 @@
 //! Where joints are.
 
 use crate::ingest::error::Fault;
-use crate::ingest::gltf::animation::byte_length;
+use crate::ingest::gltf::animation::{Channels, byte_length};
 use crate::ingest::gltf::hierarchy::local;
 use crate::ingest::gltf::{Output, Source};
-use crate::scene::{Channel, Node, Skeleton, Trs};
+use crate::scene::{Node, Skeleton, Trs};
 use glam::DAffine3;
 use std::cell::RefCell;
 use std::collections::{HashMap, HashSet};
@@ -33,7 +33,7 @@ impl Rig {
     pub(super) fn new(
         source: &Source,
         output: &mut Output,
-        channels: &[Vec<Channel>],
+        channels: &Channels,
     ) -> Result<Rig, Fault> {
         let document = source.document;
         if document.skins.is_empty() {
@@ -56,11 +56,11 @@ impl Rig {
             }
             for row in path.into_iter().rev() {
                 let parent = parents[&row];
-                let mut node =
-                    Node::fixed("", None, local(&document.beside.transforms[row], |_| {}));
-                let keys = channels[row].iter().map(byte_length).sum();
+                let mut node = Node::fixed("", None, local(&document.nodes[row].transform, |_| {}));
+                let own = channels.get(&row);
+                let keys = own.into_iter().flatten().map(byte_length).sum();
                 output.budget.take(keys, || "skins".to_string())?;
-                node.channels = channels[row].clone();
+                node.channels = own.cloned().unwrap_or_default();
                 node.settle();
                 let joint = Joint {
                     parent,
@@ -158,8 +158,8 @@ fn parents(source: &Source) -> HashMap<usize, Option<usize>> {
             continue;
         }
         parents.insert(node, parent);
-        let children = source.forest.children(node).iter().rev();
-        open.extend(children.map(|&child| (child, Some(node))));
+        let children = source.forest.children(node).rev();
+        open.extend(children.map(|child| (child, Some(node))));
     }
     parents
 }
