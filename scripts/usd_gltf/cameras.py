@@ -173,17 +173,17 @@ class _Lens:
         self.aspect = float(aspects[self.rest])
         if not np.allclose(aspects, self.aspect, rtol=1e-5):
             why = f"it is {aspects.min():.4g} to {aspects.max():.4g} wide for its height; the picture keeps the shape of the first " \
-                "frame, and sees the height of each"  # fmt: skip
+                "frame, and sees the width of each"  # fmt: skip
             self.report.warn(self.path, "animated camera aspect", why)
-        # Of the picture's width, which is not the aperture's where that has another shape.
-        wide = np.where(np.isclose(aspects, self.aspect, rtol=1e-6), width, height * self.aspect)
+        # The picture is as wide as the aperture, as usdrecord's is: that one changes its height with the shape.
+        height = np.where(np.isclose(aspects, self.aspect, rtol=1e-6), height, width / self.aspect)
         if orthographic:
             self.columns["ymag"] = height * (_TENTH * self.unit / 2)
         else:
             self.columns["yfov"] = 2 * np.arctan(height / (2 * focal))
         self.columns["focalLength_m"] = _finite(focal * _TENTH * self.unit)
         offsets = camera.GetHorizontalApertureOffsetAttr(), camera.GetVerticalApertureOffsetAttr()
-        offsets = [_finite(self._values(attribute) / size) for attribute, size in zip(offsets, (wide, height))]
+        offsets = [_finite(self._values(attribute) / size) for attribute, size in zip(offsets, (width, height))]
         self.columns["filmOffset"] = np.stack(offsets, axis=1)
 
     def _focus(self, camera: UsdGeom.Camera) -> None:

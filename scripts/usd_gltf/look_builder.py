@@ -21,7 +21,7 @@ NAMES = (
     "diffuseColor", "emissiveColor", "useSpecularWorkflow", "specularColor", "metallic", "roughness",
     "clearcoat", "clearcoatRoughness", "opacity", "opacityThreshold", "ior", "normal", "displacement",
     "occlusion", "normalScale", "specular", "specularTint", "transmission", "thinWalled",
-    "attenuationColor", "attenuationDistance",
+    "attenuationColor", "attenuationDistance", "clearcoatNormal", "clearcoatNormalScale",
 )  # fmt: skip
 """What a surface may say: UsdPreviewSurface's inputs, and of glTF's extensions what they have no word for."""
 
@@ -147,16 +147,7 @@ class LookBuilder:
     def _normal_and_occlusion(self, look: Look, read: dict[str, Value]) -> None:
         normal, occlusion = read["normal"].texture, read["occlusion"].texture
         if normal is not None:
-            standard = normal.scale[:3] == (2.0,) * 3 and normal.bias[:3] == (-1.0,) * 3
-            if standard and normal.channel == "rgb" and normal.color_space != "sRGB":
-                image = self.textures.plain(normal)
-            else:
-                planes = [(rescaled(normal, 0.5, 0.5), c) for c in _rgb(normal)]
-                image = self.textures.packed(f"{_stem(normal)}_normal", [*planes, 1.0], srgb=False)
-            look.normal_texture = self._info(look, normal, image)
-            scale = number_of(read["normalScale"], 1.0)
-            if scale != 1.0:
-                look.normal_texture["scale"] = number(scale)
+            look.normal_texture = self._normal_map(look, normal, read["normalScale"])
         if occlusion is not None:
             if occlusion.is_plain("r", srgb=False) and occlusion.scale[0] == 1.0:
                 image = self.textures.plain(occlusion)
@@ -164,6 +155,20 @@ class LookBuilder:
                 planes = [(occlusion, occlusion.channel[0]), 1.0, 1.0, 1.0]
                 image = self.textures.packed(f"{_stem(occlusion)}_occlusion", planes, srgb=False)
             look.occlusion_texture = self._info(look, occlusion, image)
+
+    def _normal_map(self, look: Look, normal: TextureRead, strength: Value) -> dict:
+        """The info of a normal map."""
+        standard = normal.scale[:3] == (2.0,) * 3 and normal.bias[:3] == (-1.0,) * 3
+        if standard and normal.channel == "rgb" and normal.color_space != "sRGB":
+            image = self.textures.plain(normal)
+        else:
+            planes = [(rescaled(normal, 0.5, 0.5), c) for c in _rgb(normal)]
+            image = self.textures.packed(f"{_stem(normal)}_normal", [*planes, 1.0], srgb=False)
+        info = self._info(look, normal, image)
+        scale = number_of(strength, 1.0)
+        if scale != 1.0:
+            info["scale"] = number(scale)
+        return info
 
     def _specular(self, look: Look, read: dict[str, Value]) -> None:
         """KHR_materials_specular, where the lobe is weaker than the index of refraction says, or tinted."""
@@ -200,6 +205,9 @@ class LookBuilder:
         if rough.texture is not None:
             extension["clearcoatRoughnessFactor"] = 1.0
             extension["clearcoatRoughnessTexture"] = self._lone(look, rough.texture, "clearcoat_roughness", "g")
+        if read["clearcoatNormal"].texture is not None:
+            normal = read["clearcoatNormal"].texture
+            extension["clearcoatNormalTexture"] = self._normal_map(look, normal, read["clearcoatNormalScale"])
         look.extensions["KHR_materials_clearcoat"] = extension
 
     def _transmission(self, look: Look, read: dict[str, Value]) -> None:

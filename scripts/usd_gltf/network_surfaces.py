@@ -112,7 +112,7 @@ class _Inputs(Inputs):
                 raise Lost(f"it depends on {basis.name}, which no texture can hold")
         return value
 
-    def normal(self, name: str, read: Read) -> None:
+    def normal(self, name: str, read: Read, to: str = "normal") -> None:
         """See `surface_models.Inputs`."""
         try:
             found = self.evaluator.normal(self.node, name)
@@ -121,8 +121,8 @@ class _Inputs(Inputs):
             return
         if found is not None and not found[0].is_constant:
             coded, scale = found
-            read["normal"] = Quantity([part.scaled(2.0).plus(Part(-1.0)) for part in coded.parts])
-            read["normalScale"] = Quantity.of(scale)
+            read[to] = Quantity([part.scaled(2.0).plus(Part(-1.0)) for part in coded.parts])
+            read[f"{to}Scale"] = Quantity.of(scale)
 
     def changed(self, name: str, why: str) -> None:
         """See `surface_models.Inputs`."""

@@ -39,6 +39,8 @@ class PreviewSurfaces:
             tint = Value(tuple(c / _F0 for c in color), value.texture and rescaled(value.texture, 1 / _F0))
             # The colour is F0 as it stands, whatever the index of refraction.
             read = {**read, "specularTint": tint, "ior": Value()}
+        # One normal for all lobes.
+        read = {**read, "clearcoatNormal": read.get("normal", Value()), "clearcoatNormalScale": read.get("normalScale", Value())}
         look = self.builder.look(path, read, is_dielectric=specular_workflow)
         if read["displacement"].texture or number_of(read["displacement"], 0.0) != 0.0:
             self.report.warn(path, "displacement", "it has no carrier")

@@ -33,8 +33,8 @@ class Inputs(Protocol):
     def get(self, name: str) -> Quantity:
         """A colour or a number; its default, which is reported, if it is lost."""
 
-    def normal(self, name: str, read: Read) -> None:
-        """Put the normal map of an input, if it has one, into `read`."""
+    def normal(self, name: str, read: Read, to: str = "normal") -> None:
+        """Put the normal map of an input, if it has one, into `read`, under the name `to`."""
 
     def changed(self, name: str, why: str) -> None:
         """Report that an input is not carried as it is."""
@@ -145,6 +145,7 @@ def _standard_surface(inputs: Inputs) -> Read:
     _specular(inputs, ("specular", "specular_color"), metalness, read, weighs_tint=False)
     if not _zero(coat):
         read["clearcoat"], read["clearcoatRoughness"] = coat, inputs.get("coat_roughness")
+        inputs.normal("coat_normal", read, "clearcoatNormal")
     read["emissiveColor"] = _times(inputs, "emission", "emission_color", is_light=True)
     read["opacity"] = _opacity(inputs, "opacity")
     inputs.normal("normal", read)
@@ -180,6 +181,7 @@ def _open_pbr(inputs: Inputs) -> Read:
     _specular(inputs, ("specular_weight", "specular_color"), metalness, read, weighs_tint=True)
     if not _zero(coat):
         read["clearcoat"], read["clearcoatRoughness"] = coat, inputs.get("coat_roughness")
+        inputs.normal("geometry_coat_normal", read, "clearcoatNormal")
     read["emissiveColor"] = _times(inputs, "emission_luminance", "emission_color", is_light=True)
     read["opacity"] = _opacity(inputs, "geometry_opacity")
     inputs.normal("geometry_normal", read)
@@ -227,6 +229,7 @@ def _gltf_pbr(inputs: Inputs) -> Read:
     coat = inputs.get("clearcoat")
     if not _zero(coat):
         read["clearcoat"], read["clearcoatRoughness"] = coat, inputs.get("clearcoat_roughness")
+        inputs.normal("clearcoat_normal", read, "clearcoatNormal")
     amount = inputs.get("transmission")
     if not _zero(amount):
         read["transmission"] = amount
@@ -292,7 +295,7 @@ _STANDARD_LOST = {
     "transmission|transmission_dispersion": _WORD["dispersion"],
     "transmission|transmission_extra_roughness": "glTF's transmission is as rough as its reflection",
     "coat|coat_anisotropy": _WORD["coat"], "coat|coat_IOR": "glTF's coat has an index of refraction of 1.5",
-    "coat|coat_normal": "the coat has the normals of the base", "coat|coat_affect_color": _WORD["coat"],
+    "coat|coat_affect_color": _WORD["coat"],
     "coat|coat_affect_roughness": _WORD["coat"], "tangent": "tangents follow the texture coordinates",
 }  # fmt: skip
 """`gate|input`: an input that matters where the gate is not 0."""
@@ -302,12 +305,11 @@ _OPEN_PBR_LOST = {
     "transmission_weight|transmission_scatter": _WORD["scatter"],
     "transmission_weight|transmission_dispersion_scale": _WORD["dispersion"],
     "coat_weight|coat_roughness_anisotropy": _WORD["coat"], "coat_weight|coat_ior": "glTF's coat has an index of refraction of 1.5",
-    "coat_weight|geometry_coat_normal": "the coat has the normals of the base",
     "geometry_tangent": "tangents follow the texture coordinates",
 }  # fmt: skip
 _GLTF_LOST = {
     "sheen_color": _WORD["sheen"], "iridescence": _WORD["film"], "anisotropy_strength": _WORD["anisotropy"],
-    "dispersion": _WORD["dispersion"], "clearcoat|clearcoat_normal": "the coat has the normals of the base",
+    "dispersion": _WORD["dispersion"],
     "tangent": "tangents follow the texture coordinates",
 }  # fmt: skip
 _ARNOLD_STANDARD = {

@@ -20,8 +20,10 @@ use std::f32::consts::{FRAC_1_PI, PI, TAU};
 /// A receiver together with the lobes of its surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Glossy {
-    /// Where it is; with a normal.
+    /// Where it is; with a normal, above whose horizon is all light that it reflects.
     pub receiver: Receiver,
+    /// The normal of the glossy lobe, unit, world space: mostly the receiver's.
+    pub about: Vec3,
     /// Direction towards the eye: unit, world space, on the normal's side.
     pub to_eye: Vec3,
     /// What the surface reflects that way.
@@ -66,7 +68,11 @@ impl Viewer for Glossy {
     fn within(&self, space: &Similarity) -> Glossy {
         let receiver = self.receiver.within(space);
         let [to_eye, toward] = [self.to_eye, self.toward].map(|v| space.direction(v));
-        Glossy { receiver, to_eye, toward, ..*self }
+        let about = match self.about == self.receiver.normal {
+            true => receiver.normal,
+            false => space.direction(self.about),
+        };
+        Glossy { receiver, about, to_eye, toward, ..*self }
     }
 }
 
@@ -83,14 +89,14 @@ impl Glossy {
     /// The same for light from all directions.
     pub fn albedo(&self) -> f32 {
         let Lobes { diffuse, at_normal, toward_grazing, .. } = self.lobes;
-        let cos_o = self.receiver.normal.dot(self.to_eye).clamp(0.0, 1.0);
+        let cos_o = self.about.dot(self.to_eye).clamp(0.0, 1.0);
         (diffuse + at_normal + toward_grazing * (1.0 - cos_o).powi(5)).max(LEAST)
     }
 
     #[inline(always)]
     fn reflected(&self, sight: &Sight) -> (f32, f32) {
         let Lobes { diffuse, at_normal, toward_grazing, alpha } = self.lobes;
-        let [nx, ny, nz] = self.receiver.normal.to_array();
+        let [nx, ny, nz] = self.about.to_array();
         let [ex, ey, ez] = self.to_eye.to_array();
         let [tx, ty, tz] = sight.to;
         let one_minus_cos_u = sight.one_minus_cos_u();

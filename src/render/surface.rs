@@ -8,7 +8,8 @@
 //! flipped to the side of `wo`. A normal of the file that points against the winding is flipped. If the
 //! file has no normals, the triangle's normal is used. A normal that a normal map or interpolation bends
 //! away from `wo` is bent back until `wo` is above its horizon. It is not bent past the cosine between
-//! `wo` and the triangle's normal: a flat surface is never bent, however grazing `wo` is.
+//! `wo` and the triangle's normal: a flat surface is never bent, however grazing `wo` is. A coat's own normals are
+//! treated alike.
 
 use super::bsdf::{ALPHA_MIN, Bsdf, Passage, SurfaceSample};
 use super::rays::{Anchor, Hit, HitSurface};
@@ -53,6 +54,8 @@ pub struct Surface {
     pub front: bool,
     /// Shading frame, world space; its normal is on `wo`'s side.
     pub frame: Frame,
+    /// Of the coat, on `wo`'s side, where it has others than what is below.
+    pub coat_normal: Option<Vec3>,
     /// The material here.
     pub sample: SurfaceSample,
 }
@@ -60,7 +63,7 @@ pub struct Surface {
 impl Surface {
     /// How this point reflects.
     pub fn bsdf(&self) -> Bsdf {
-        Bsdf::new(&self.sample, self.frame)
+        Bsdf::new(&self.sample, self.frame).coated_about(self.coat_normal)
     }
 }
 
@@ -109,15 +112,20 @@ impl<'a> Surfaces<'a> {
         let (at, material) = self.locate(instance, triangle, barycentric);
         let front = anchor.normal.dot(wo) >= 0.0;
         let node = self.scene.instances[instance as usize].node;
-        let normal = self.shading_normal(&at, material, &self.pose.world(node), anchor.normal);
+        let to_world = self.pose.world(node);
         let least = anchor.normal.dot(wo).abs().min(LEAST_COSINE);
-        let normal = toward(if front { normal } else { -normal }, wo, least);
-        let frame = Frame::around(normal);
+        let bent = |map: Option<(TextureUse, f32)>| {
+            let normal = self.shading_normal(&at, map, &to_world, anchor.normal);
+            toward(if front { normal } else { -normal }, wo, least)
+        };
+        let frame = Frame::around(bent(normal_map(material)));
         let mut sample = self.evaluate(&at, material);
+        let coat_normal = (sample.coat > 0.0 && material.has_coat_normals())
+            .then(|| bent(coat_normal_map(material)));
         if let Passage::Solid(ior) = sample.passage {
             sample.passage = Passage::Solid(if front { ior } else { 1.0 / ior });
         }
-        Surface { anchor, front, frame, sample }
+        Surface { anchor, front, frame, coat_normal, sample }
     }
 
     /// What is behind the surface of solid glass: its absorption, 1/m. `None` if it is none.
@@ -141,8 +149,16 @@ impl<'a> Surfaces<'a> {
         let node = self.scene.instances[instance as usize].node;
         let to_world = self.pose.world(node);
         // Not bent towards either end, so that both ends see the same tint.
-        let normal = self.shading_normal(&at, material, &to_world, pane.anchor.normal);
-        self.evaluate(&at, material).tint(normal.dot(direction).abs())
+        let cosine = |map: Option<(TextureUse, f32)>| {
+            let normal = self.shading_normal(&at, map, &to_world, pane.anchor.normal);
+            normal.dot(direction).abs()
+        };
+        let own = cosine(normal_map(material));
+        let coat = match material.has_coat_normals() {
+            true => cosine(coat_normal_map(material)),
+            false => own,
+        };
+        self.evaluate(&at, material).tint(own, coat)
     }
 
     fn locate(&self, instance: u32, triangle: u32, barycentric: Vec2) -> (At<'a>, &Material) {
@@ -205,11 +221,11 @@ impl<'a> Surfaces<'a> {
         }
     }
 
-    /// Unit, world space, on the front's side.
+    /// With a normal map and its scale, or none. Unit, world space, on the front's side.
     fn shading_normal(
         &self,
         at: &At,
-        material: &Material,
+        map: Option<(TextureUse, f32)>,
         to_world: &Affine3A,
         flat: Vec3,
     ) -> Vec3 {
@@ -224,11 +240,11 @@ impl<'a> Surfaces<'a> {
             let normal = across.try_normalize().map_or(flat, |across| across.as_vec3());
             if normal.dot(flat) < 0.0 { -normal } else { normal }
         };
-        let Some(used) = material.normal_texture.filter(|_| built_in::TEXTURES) else {
+        let Some((used, scale)) = map.filter(|_| built_in::TEXTURES) else {
             return smooth;
         };
-        let texel = self.lookup(at, &material.normal_texture).truncate() * 2.0 - 1.0;
-        let bent = texel * Vec3::new(material.normal_scale, material.normal_scale, 1.0);
+        let texel = self.lookup(at, &Some(used)).truncate() * 2.0 - 1.0;
+        let bent = texel * Vec3::new(scale, scale, 1.0);
         let Some((tangent, turn)) = at.tangent(&used) else { return smooth };
         let tangent = (matrix * tangent).reject_from_normalized(smooth.as_dvec3());
         let Some(tangent) = tangent.try_normalize().map(|tangent| tangent.as_vec3()) else {
@@ -283,6 +299,17 @@ impl At<'_> {
         // With v downwards a texture that is not mirrored winds the other way than its triangle.
         (area != 0.0).then_some((along_u, -1f32.copysign(area as f32)))
     }
+}
+
+/// The normal map of what is below the coat, and its scale.
+fn normal_map(material: &Material) -> Option<(TextureUse, f32)> {
+    Some((material.normal_texture?, material.normal_scale))
+}
+
+/// That of the coat.
+fn coat_normal_map(material: &Material) -> Option<(TextureUse, f32)> {
+    let coat = material.coat?;
+    Some((coat.normal_texture?, coat.normal_scale))
 }
 
 /// `det(M) M^-T`, which takes normals along; finite for any matrix.

@@ -40,7 +40,14 @@ impl Integrator<'_> {
         };
         let surface = self.surfaces.at(instance, triangle, barycentric, hit.anchor, wo);
         let reflection = surface.bsdf().toward(wo);
-        let normal = if reflection.transmits() { Vec3::ZERO } else { surface.frame.normal };
+        let normal = if reflection.transmits() {
+            Vec3::ZERO
+        } else if reflection.has_two_horizons() {
+            // All that is reflected is above the triangle too.
+            if surface.front { hit.anchor.normal } else { -hit.anchor.normal }
+        } else {
+            surface.frame.normal
+        };
         let receiver = Receiver { point: hit.anchor.position, normal };
         let class = self.links.map_or(ReceiverClass::ALL, |links| links.of_instance(instance));
         let [here, beyond] = self.sides(hit, wo);
@@ -78,7 +85,7 @@ impl Vertex {
             |lobes: &Lobes| built_in::GLOSSY && lobes.at_normal + lobes.toward_grazing > 0.0;
         // Where light passes, lights on both sides are wanted: a site without a horizon.
         let lobes = self.reflection.lobes().filter(|_| !self.reflection.transmits());
-        let Some(lobes) = lobes.filter(is_glossy) else {
+        let Some((lobes, about)) = lobes.filter(|(lobes, _)| is_glossy(lobes)) else {
             return self.wanted_at(Site::At(receiver));
         };
         // Independent of the direction in which the path continues: that one may hit a light, whose
@@ -88,7 +95,7 @@ impl Vertex {
             self.reflection.sample(lobe, Vec2::new(u, v))
         });
         let toward = drawn.map_or(receiver.normal, |sample| sample.wi);
-        let glossy = Glossy { receiver, to_eye: self.wo, lobes, toward };
+        let glossy = Glossy { receiver, about, to_eye: self.wo, lobes, toward };
         self.wanted_at(Site::Glossy(glossy))
     }
 

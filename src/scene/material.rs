@@ -60,6 +60,10 @@ pub struct Coat {
     pub roughness: f32,
     /// Linear texture: green multiplies the roughness.
     pub roughness_texture: Option<TextureUse>,
+    /// Its own tangent-space normals, linear. Without them it has those of the mesh, whatever map is below it.
+    pub normal_texture: Option<TextureUse>,
+    /// Scale of that map's x and y.
+    pub normal_scale: f32,
 }
 
 /// Light that passes through the dielectric, tinted by the base colour (`KHR_materials_transmission`).
@@ -128,7 +132,9 @@ impl Material {
 
     /// The textures of its reflection, those that are there.
     pub fn textures(&self) -> impl Iterator<Item = TextureUse> {
-        let coat = self.coat.map(|coat| [coat.factor_texture, coat.roughness_texture]);
+        let coat = self
+            .coat
+            .map(|coat| [coat.factor_texture, coat.roughness_texture, coat.normal_texture]);
         let transmission = self.transmission.and_then(|transmission| transmission.factor_texture);
         let uses = [
             self.base_color_texture,
@@ -139,6 +145,19 @@ impl Material {
             transmission,
         ];
         uses.into_iter().chain(coat.into_iter().flatten()).flatten()
+    }
+
+    /// Whether its coat has other normals than what is below it.
+    pub fn has_coat_normals(&self) -> bool {
+        self.coat.is_some_and(|coat| {
+            let is_scaled = coat.normal_texture.is_some() && coat.normal_scale != self.normal_scale;
+            coat.normal_texture != self.normal_texture || is_scaled
+        })
+    }
+
+    /// Whether it, or its coat, has a normal map.
+    pub fn has_normal_map(&self) -> bool {
+        self.normal_texture.is_some() || self.coat.is_some_and(|coat| coat.normal_texture.is_some())
     }
 
     /// Whether it is the surface of solid glass.

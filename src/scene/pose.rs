@@ -330,11 +330,6 @@ impl<T: Copy> Keys<T> {
 }
 
 impl Keys<Vec3> {
-    /// The value at a time, seconds on the clock of a timeline.
-    pub fn at(&self, time_s: f64, timeline: Timeline) -> DVec3 {
-        self.blend_at(Instant { time_s, timeline })
-    }
-
     /// The largest of each component over all keys: what values that are no spline never exceed.
     pub(super) fn peak(&self) -> Vec3 {
         self.values.iter().fold(Vec3::ZERO, |peak, &value| peak.max(value))
@@ -398,6 +393,11 @@ impl Blend for Vec3 {
 }
 
 impl<T: Blend> Keys<T> {
+    /// The value at a time, seconds on the clock of a timeline.
+    pub fn at(&self, time_s: f64, timeline: Timeline) -> T::Exact {
+        self.blend_at(Instant { time_s, timeline })
+    }
+
     pub(super) fn blend_at(&self, at: Instant) -> T::Exact {
         let at = self.find(at);
         match self.interpolation {

@@ -44,7 +44,7 @@ pub struct Requirements {
     pub animated_nodes: usize,
     /// Materials with a coverage below one.
     pub cutouts: usize,
-    /// Materials with a normal map.
+    /// Materials with a normal map, of their own or of their coat.
     pub normal_maps: usize,
     /// Materials with a specular lobe, and one for all meshes without a material.
     pub glossy: usize,
@@ -128,7 +128,7 @@ impl Requirements {
         needs.animated_nodes = scene.nodes.iter().filter(|n| !n.channels.is_empty()).count();
         for material in &scene.materials {
             needs.cutouts += usize::from(material.alpha_mode != AlphaMode::Opaque);
-            needs.normal_maps += usize::from(material.normal_texture.is_some());
+            needs.normal_maps += usize::from(material.has_normal_map());
             needs.glossy += usize::from(material.is_glossy());
             needs.coats += usize::from(material.coat.is_some());
             needs.glass += usize::from(material.transmission.is_some());

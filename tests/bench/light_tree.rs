@@ -96,6 +96,7 @@ fn benchmarks(criterion: &mut Criterion) {
     });
     let glossy = |i: u32| Glossy {
         receiver: receiver(i),
+        about: receiver(i).normal,
         to_eye: Vec3::new(0.6, 0.8, 0.0),
         lobes: Lobes { diffuse: 0.5, at_normal: 0.04, toward_grazing: 0.5, alpha: 0.1 },
         toward: Vec3::Y,

@@ -134,9 +134,11 @@ def test_a_picture_keeps_its_shape(export):
     assert result.warned("cameras") == {"animated camera aspect"}
     scene = Gltf(result.path)
     assert scene.json["cameras"][0]["perspective"]["aspectRatio"] == pytest.approx(1.5)
-    # The height is constant, and so is the offset, a tenth of the picture that is seen.
-    assert "values" not in usd(scene)
-    assert usd(scene)["filmOffset"] == pytest.approx([0.1, 0])
+    # As wide as the aperture, and so much less high.
+    for code, width in ((1, 30), (6, 60)):
+        lens = shown(scene, code)
+        assert lens["height"] == pytest.approx(2 * math.atan(width / 1.5 / (2 * 50)))
+        assert lens["filmOffset"] == pytest.approx([3 / width, 0])
 
 
 @pytest.mark.parametrize(

@@ -205,6 +205,62 @@ def test_normal_maps(gltf, tmp_path):
     assert pixels(scene, info)[0, 0].tolist() == [128, 128, 255, 255]
 
 
+COATS = {
+    "ND_standard_surface_surfaceshader": ("normal", "coat", "coat_normal"),
+    "ND_open_pbr_surface_surfaceshader": ("geometry_normal", "coat_weight", "geometry_coat_normal"),
+    "ND_gltf_pbr_surfaceshader": ("normal", "clearcoat", "clearcoat_normal"),
+}
+
+
+@pytest.mark.parametrize("identifier", COATS)
+def test_coats_have_normal_maps_of_their_own(export, tmp_path, identifier):
+    base, coat, own = COATS[identifier]
+    picture(tmp_path / "n.png", 128, 128, 255)
+    picture(tmp_path / "c.png", 140, 128, 250)
+    shaders = "".join(
+        image(f"{name}I", f"{name}.png", "vector3")
+        + node(name, "ND_normalmap_float", f"float inputs:scale = {scale}\n" + link("in", f"{name}I", "float3"), "float3 outputs:out")
+        for name, scale in (("n", 1.0), ("c", 0.25))
+    )
+
+    def look(*lines):
+        result = export(network("\n".join(lines), shaders, identifier))
+        assert not [what for what in result.warned("materials") if "normal" in what]
+        scene = Gltf(result.path)
+        return scene, scene.material("/M")
+
+    on = f"float inputs:{coat} = 1"
+    scene, material = look(on, link(base, "n", "float3"), link(own, "c", "float3"))
+    info = extension(material, "clearcoat")["clearcoatNormalTexture"]
+    assert info["scale"] == 0.25
+    assert pixels(scene, info)[0, 0, :3].tolist() == [140, 128, 250]
+    assert pixels(scene, material["normalTexture"])[0, 0, :3].tolist() == [128, 128, 255]
+    # Without one the coat is as smooth as the mesh, in MaterialX and in glTF.
+    _, material = look(on, link(base, "n", "float3"))
+    assert "normalTexture" in material and "clearcoatNormalTexture" not in extension(material, "clearcoat")
+    _, material = look(on, link(own, "c", "float3"))
+    assert "normalTexture" not in material and "clearcoatNormalTexture" in extension(material, "clearcoat")
+    # And without a coat there is nothing.
+    _, material = look(f"float inputs:{coat} = 0", link(own, "c", "float3"))
+    assert not extension(material, "clearcoat")
+
+
+def test_the_coat_of_a_preview_surface_has_the_normals_of_all(gltf, tmp_path):
+    picture(tmp_path / "n.png", 128, 128, 255)
+    lines = link("normal", "N", "normal3f", "rgb") + "float inputs:clearcoat = 0.5"
+    texture = """def Shader "N" {
+        uniform token info:id = "UsdUVTexture"
+        asset inputs:file = @n.png@
+        token inputs:sourceColorSpace = "raw"
+        float4 inputs:scale = (2, 2, 2, 1)
+        float4 inputs:bias = (-1, -1, -1, 0)
+        float3 outputs:rgb
+    }"""
+    scene = gltf(network(lines, texture, "UsdPreviewSurface", ""))
+    material = scene.material("/M")
+    assert material["normalTexture"]["index"] == extension(material, "clearcoat")["clearcoatNormalTexture"]["index"]
+
+
 def test_bumps_are_lost(export):
     result = export(network(link("normal", "B", "float3"), node("B", "ND_bump_vector3", "", "float3 outputs:out")))
     assert result.warned("materials") == {"standard_surface normal"}

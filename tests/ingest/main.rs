@@ -23,4 +23,5 @@ mod probe;
 mod real;
 mod refused;
 mod shared;
+mod strengths;
 mod usd;

@@ -150,7 +150,7 @@ fn viewer(lit: &Lit, standing: &Standing) -> (AnyViewer, Vec<(DVec3, Vec3)>) {
         0..=2 => (AnyViewer::Receiver(receiver), at),
         3 => {
             let lobes = Lobes { diffuse: 0.5, at_normal: 0.04, toward_grazing: 0.9, alpha: 0.01 };
-            let glossy = Glossy { receiver, to_eye: normal, lobes, toward: normal };
+            let glossy = Glossy { receiver, about: normal, to_eye: normal, lobes, toward: normal };
             (AnyViewer::Glossy(glossy), at)
         }
         4 => (AnyViewer::DistanceOnly(DistanceOnly(receiver)), at),

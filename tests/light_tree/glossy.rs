@@ -35,8 +35,8 @@ fn surface() -> impl Strategy<Value = (Bsdf, Glossy)> {
                 passage: Default::default(),
             };
             let bsdf = Bsdf::new(&sample, Frame::around(any.receiver.normal));
-            let lobes = bsdf.toward(any.to_eye).lobes()?;
-            Some((bsdf, Glossy { lobes, ..any }))
+            let (lobes, about) = bsdf.toward(any.to_eye).lobes()?;
+            Some((bsdf, Glossy { lobes, about, ..any }))
         },
     )
 }
@@ -123,8 +123,8 @@ fn variances(sample: &SurfaceSample) -> (f64, f64) {
             let point = Vec3::new(random(i, 10) - 0.5, 0.0, random(i, 11) - 0.5) * 20.0;
             let to_eye = Vec3::new(random(i, 12) - 0.5, 0.3, random(i, 13) - 0.5).normalize();
             let receiver = candelabra::light_tree::Receiver { point, normal: Vec3::Y };
-            let lobes = bsdf.toward(to_eye).lobes().unwrap();
-            let glossy = Glossy { receiver, to_eye, lobes, toward: Vec3::Y };
+            let (lobes, about) = bsdf.toward(to_eye).lobes().unwrap();
+            let glossy = Glossy { receiver, about, to_eye, lobes, toward: Vec3::Y };
             let contribution = |light: Picked, _: f64| {
                 let lamp = &lamps[light.emitter().unwrap() as usize];
                 let away = lamp.aabb.center() - point;

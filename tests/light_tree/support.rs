@@ -186,10 +186,13 @@ pub fn glossy() -> impl Strategy<Value = Glossy> {
             alpha,
         },
     );
-    (receiver(), direction(), direction(), direction(), lobes).prop_map(
-        |(receiver, normal, to_eye, toward, lobes)| {
+    // A coat may have a normal of its own.
+    let about = (any::<bool>(), direction());
+    (receiver(), direction(), about, direction(), direction(), lobes).prop_map(
+        |(receiver, normal, (is_own, about), to_eye, toward, lobes)| {
             let to_eye = to_eye * 1f32.copysign(to_eye.dot(normal));
-            Glossy { receiver: Receiver { normal, ..receiver }, to_eye, lobes, toward }
+            let about = if is_own { about * 1f32.copysign(about.dot(to_eye)) } else { normal };
+            Glossy { receiver: Receiver { normal, ..receiver }, about, to_eye, lobes, toward }
         },
     )
 }

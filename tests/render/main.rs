@@ -4,6 +4,7 @@
 mod bounces;
 mod cameras;
 mod closed_forms;
+mod coats;
 mod deforming;
 mod determinism;
 mod extremes;

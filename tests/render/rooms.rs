@@ -7,8 +7,8 @@ use crate::stage::{
     Stage, aimed, at, coat, facing, filter, glow, lambert, milk, picture, scaled, solid,
 };
 use candelabra::scene::{
-    AlphaMode, IesProfile, IesTable, LightKind, Material, Node, Pixels, Pole, Shaping, Texture,
-    TextureUse, Transmission, Wrap,
+    AlphaMode, Coat, IesProfile, IesTable, LightKind, Material, Node, Pixels, Pole, Shaping,
+    Texture, TextureUse, Transmission, Wrap,
 };
 use glam::{DVec3, Vec3};
 use std::f64::consts::{PI, TAU};
@@ -336,6 +336,24 @@ pub fn of_every_material() -> Vec<Room> {
         room("smooth metal", metal(0.4), some_lights),
         room("varnish", varnish, some_lights),
         room("a coat on plaster", paint(1.0, 0.3), some_lights),
+        room("a flat coat above bumps", plaster(), |stage| {
+            some_lights(stage);
+            let normal_texture = bumps(stage);
+            let floor = Material { normal_texture, roughness: 0.5, specular: 1.0, ..plaster() };
+            stage.scene.materials[0] = Material { coat: coat(1.0, 0.3), ..floor };
+        }),
+        room("a coat with bumps of its own", plaster(), |stage| {
+            some_lights(stage);
+            let normal_texture = bumps(stage);
+            let coat = coat(1.0, 0.3).map(|coat| Coat { normal_texture, ..coat });
+            stage.scene.materials[0].coat = coat;
+        }),
+        room("a flat coat above bumps of milk glass", milk(0.6, 0.7), |stage| {
+            lights_on_both_sides(stage);
+            let normal_texture = bumps(stage);
+            let floor = Material { normal_texture, ..milk(0.6, 0.7) };
+            stage.scene.materials[0] = Material { coat: coat(1.0, 0.4), ..floor };
+        }),
         room("a thin coat on metal", Material { coat: coat(0.5, 0.4), ..metal(0.7) }, some_lights),
         room("panes", plaster(), panes),
         room("panes above a smooth metal", metal(0.4), panes),

@@ -64,7 +64,14 @@ pub fn lambert(albedo: impl Into<Vec3>) -> Material {
 
 /// What a material is coated with.
 pub fn coat(factor: f32, roughness: f32) -> Option<Coat> {
-    Some(Coat { factor, factor_texture: None, roughness, roughness_texture: None })
+    Some(Coat {
+        factor,
+        factor_texture: None,
+        roughness,
+        roughness_texture: None,
+        normal_texture: None,
+        normal_scale: 1.0,
+    })
 }
 
 /// A pane of smooth glass of some colour that mirrors nothing: it lets through the colour's share at every angle.

@@ -6,6 +6,7 @@ use super::accessors::Accessor;
 use super::document::{Document, Node, Target, label};
 use super::lenses::{self, YFOV, YMAG};
 use super::posing::Weights;
+use super::strengths::{COLOR, INTENSITY, Strength};
 use super::{Output, Source};
 use crate::ingest::error::Fault;
 use crate::scene::{Category, Channel, Interpolation, Keys, LensKeys};
@@ -19,13 +20,16 @@ use std::sync::Arc;
 /// How far the length of a key's quaternion may be from one without a note; small integers are coarse.
 const QUATERNION_TOLERANCE: f32 = 0.03;
 
+/// Where pointers to lights begin.
+const LIGHTS: &str = "/extensions/KHR_lights_punctual/lights/";
+
 /// The path of a channel that animates morph targets.
 const WEIGHTS: &str = "weights";
 
 /// The channels of nodes, by their numbers in the file.
 pub(super) type Channels = BTreeMap<usize, Vec<Channel>>;
 
-/// What animations say of the nodes and cameras of a file.
+/// What animations say of the nodes, cameras and lights of a file.
 pub(super) struct Animated {
     /// The channels of the nodes that have any.
     pub channels: Channels,
@@ -33,6 +37,8 @@ pub(super) struct Animated {
     pub weights: BTreeMap<usize, Weights>,
     /// Of the cameras whose height is animated.
     pub lenses: BTreeMap<usize, Arc<LensKeys>>,
+    /// Of the lights whose colour or intensity is animated.
+    pub strengths: BTreeMap<usize, Strength>,
 }
 
 /// What a channel animates a part of, by its number in the file.
@@ -40,6 +46,7 @@ pub(super) struct Animated {
 enum Moved {
     Node(usize),
     Camera(usize),
+    Light(usize),
 }
 
 /// The keys of a sampler that can be read.
@@ -54,12 +61,13 @@ pub(super) struct Track {
     mended: Option<&'static str>,
 }
 
-/// The channels and weights of every node of the file, and the heights of its cameras.
+/// The channels and weights of every node of the file, the heights of its cameras and the strengths of its lights.
 pub(super) fn compile(source: &Source, output: &mut Output) -> Result<Animated, Fault> {
     let document = source.document;
     let timeline = output.scene.timeline;
     let mut channels = Channels::new();
     let (mut weights, mut lenses) = (BTreeMap::new(), BTreeMap::new());
+    let mut strengths: BTreeMap<usize, Strength> = BTreeMap::new();
     let mut moved = HashSet::new();
     for (i, animation) in document.animations.iter().enumerate() {
         let object = label("animation", i, animation.name.as_deref());
@@ -78,6 +86,7 @@ pub(super) fn compile(source: &Source, output: &mut Output) -> Result<Animated, 
                 let what = match moves {
                     Moved::Node(node) => label("node", node, None),
                     Moved::Camera(camera) => label("camera", camera, None),
+                    Moved::Light(light) => label("light", light, None),
                 };
                 let text = format!("only the first animation of its {path} is read");
                 output.notes.add(moves.category(), what, text);
@@ -99,22 +108,26 @@ pub(super) fn compile(source: &Source, output: &mut Output) -> Result<Animated, 
             };
             match compiled {
                 Ok((mut track, values)) => {
-                    match moves {
-                        Moved::Camera(camera) => match lenses::height(path, &track, values) {
-                            Ok(lens) => _ = lenses.insert(camera, lens),
-                            Err(problem) => {
-                                let text = format!("{problem}; this animation is left out");
-                                output.notes.add(moves.category(), &*object, text);
-                                continue;
-                            }
-                        },
+                    let put = match moves {
+                        Moved::Camera(camera) => lenses::height(path, &track, values)
+                            .map(|lens| _ = lenses.insert(camera, lens)),
+                        Moved::Light(light) => {
+                            strengths.entry(light).or_default().put(path, &track, values)
+                        }
                         Moved::Node(node) if path == WEIGHTS => {
                             weights.insert(node, Weights::of(&track, values, timeline));
+                            Ok(())
                         }
                         Moved::Node(node) => {
                             let own = channel(path, &mut track, values);
                             channels.entry(node).or_default().push(own);
+                            Ok(())
                         }
+                    };
+                    if let Err(problem) = put {
+                        let text = format!("{problem}; this animation is left out");
+                        output.notes.add(moves.category(), &*object, text);
+                        continue;
                     }
                     moved.insert((moves, path));
                     if let Some(text) = track.mended {
@@ -128,7 +141,9 @@ pub(super) fn compile(source: &Source, output: &mut Output) -> Result<Animated, 
             }
         }
     }
-    Ok(Animated { channels, weights, lenses })
+    // Of some nothing could be read.
+    strengths.retain(|_, strength| strength.is_animated());
+    Ok(Animated { channels, weights, lenses, strengths })
 }
 
 impl Moved {
@@ -136,6 +151,7 @@ impl Moved {
         match self {
             Moved::Node(_) => Category::Animation,
             Moved::Camera(_) => Category::Cameras,
+            Moved::Light(_) => Category::Lights,
         }
     }
 }
@@ -153,6 +169,7 @@ fn can_move(document: &Document, moves: Moved, path: &str) -> bool {
         Moved::Camera(camera) => {
             document.beside.magnifications.get(camera).is_some_and(Option::is_some)
         }
+        Moved::Light(light) => light < document.light_count(),
     }
 }
 
@@ -179,6 +196,11 @@ fn target(target: &Target) -> Option<(Moved, &'static str)> {
                 let path = [YFOV, YMAG].into_iter().find(|part| *part == path)?;
                 return Some((Moved::Camera(camera.parse().ok()?), path));
             }
+            if let Some(light) = pointer.strip_prefix(LIGHTS) {
+                let (light, path) = light.split_once('/')?;
+                let path = [COLOR, INTENSITY].into_iter().find(|part| *part == path)?;
+                return Some((Moved::Light(light.parse().ok()?), path));
+            }
             let (node, path) = pointer.strip_prefix("/nodes/")?.split_once('/')?;
             Some((Moved::Node(node.parse().ok()?), part(path)?))
         }
@@ -200,7 +222,7 @@ fn unread(target: &Target) -> (&str, Category, &'static str) {
         Some("materials") => (Category::Materials, "animation of materials is not read"),
         Some("cameras") => (Category::Cameras, "animation of this part of a lens is not read"),
         Some("extensions") if pointer.contains("KHR_lights_punctual") => {
-            (Category::Lights, "animation of light is not read; the light is constant")
+            (Category::Lights, "animation of this part of a light is not read; it is constant")
         }
         Some("meshes") => (Category::Animation, "animation of shapes is not read"),
         _ => (Category::Animation, "animation of this is not read"),
@@ -227,7 +249,7 @@ fn track(
     let in_a_key = if interpolation == Interpolation::Cubic { 3 } else { 1 };
     let shape = match path {
         "rotation" => Type::Vec4,
-        WEIGHTS | YFOV | YMAG => Type::Scalar,
+        WEIGHTS | YFOV | YMAG | INTENSITY => Type::Scalar,
         _ => Type::Vec3,
     };
     let typed = values.component == ComponentType::F32 || values.normalized;

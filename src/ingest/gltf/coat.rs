@@ -1,5 +1,5 @@
-//! `KHR_materials_clearcoat`. The coat has the normals of what is below; where the extension gives it others, a note
-//! says so.
+//! `KHR_materials_clearcoat`. A coat without normals of its own has those of the mesh, as the extension says, whatever
+//! normal map is below it.
 
 use super::document::Real;
 use super::textures::Textures;
@@ -23,16 +23,21 @@ struct Row {
     #[serde(default)]
     clearcoat_roughness_factor: Real,
     clearcoat_roughness_texture: Option<Info>,
-    clearcoat_normal_texture: Option<Info>,
+    clearcoat_normal_texture: Option<Value>,
 }
 
-/// The coat that the extension of a material with a normal map, or none, tells; `None` if it has no strength or
-/// cannot be read.
+/// What a normal map has beside its texture.
+#[derive(Deserialize)]
+struct Scaled {
+    scale: Option<Real>,
+}
+
+/// The coat that the extension tells; `None` if it has no strength or cannot be read.
 pub(super) fn compile(
     textures: &mut Textures,
     source: &Source,
     output: &mut Output,
-    (extension, normal_map): (&Value, Option<&Info>),
+    extension: &Value,
     object: &str,
 ) -> Option<Coat> {
     let note = |output: &mut Output, text: String| {
@@ -45,6 +50,20 @@ pub(super) fn compile(
             return None;
         }
     };
+    let normals = row.clearcoat_normal_texture.as_ref().map(|told| {
+        let scale = Scaled::deserialize(told)?.scale.map_or(1.0, |scale| scale.f32());
+        Ok::<_, serde_json::Error>((Info::deserialize(told)?, scale))
+    });
+    let normals = match normals.transpose() {
+        Ok(normals) => normals,
+        Err(error) => {
+            note(
+                output,
+                format!("its {NAME} has a normal map that cannot be read: {error}; left out"),
+            );
+            None
+        }
+    };
     let [factor, roughness] = [row.clearcoat_factor, row.clearcoat_roughness_factor].map(|told| {
         let within = told.f32().clamp(0.0, 1.0);
         if within != told.f32() {
@@ -55,17 +74,25 @@ pub(super) fn compile(
     if factor == 0.0 {
         return None;
     }
-    let mut texture = |info: Option<Info>| {
+    let mut texture = |info: Option<Info>, instead: &str| {
         let found = textures.texture_use(source, output, &info?, Coding::Linear);
-        found
-            .map_err(|problem| note(output, format!("{problem}; its coat is as its factor says")))
-            .ok()
+        found.map_err(|problem| note(output, format!("{problem}; {instead}"))).ok()
     };
-    let factor_texture = texture(row.clearcoat_texture);
-    let roughness_texture = texture(row.clearcoat_roughness_texture);
-    let of_coat = row.clearcoat_normal_texture.map(|info| info.index);
-    if of_coat != normal_map.map(|info| info.index) {
-        note(output, "its coat has other normals than what is below; drawn with the same".into());
-    }
-    Some(Coat { factor, factor_texture, roughness, roughness_texture })
+    let as_factor = "its coat is as its factor says";
+    let factor_texture = texture(row.clearcoat_texture, as_factor);
+    let roughness_texture = texture(row.clearcoat_roughness_texture, as_factor);
+    let (map, scale) = match normals {
+        Some((map, scale)) => (Some(map), scale),
+        None => (None, 1.0),
+    };
+    let normal_texture = texture(map, "its coat is drawn without a normal map");
+    let normal_scale = if scale.is_finite() { scale } else { 1.0 };
+    Some(Coat {
+        factor,
+        factor_texture,
+        roughness,
+        roughness_texture,
+        normal_texture,
+        normal_scale,
+    })
 }

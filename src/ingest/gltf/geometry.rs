@@ -169,7 +169,7 @@ impl Meshes {
         let material = primitive.material;
         let material = material.and_then(|m| self.materials.index(source, output, m, object));
         let look = material.map(|m| output.scene.materials[m as usize].clone()).unwrap_or_default();
-        let wants_tangents = look.normal_texture.is_some();
+        let wants_tangents = look.has_normal_map();
         let mut sets: Vec<u32> = uv_sets(&look).collect();
         sets.sort_unstable();
         sets.dedup();

@@ -7,6 +7,7 @@ use super::lights::{self, Placed};
 use super::links::LinkTable;
 use super::posing::{Hung, Pose, Poses};
 use super::profiles::Profiles;
+use super::strengths::Strength;
 use super::{Output, Source, cameras, fog, instancing};
 use crate::ingest::error::Fault;
 use crate::ingest::paths::{PrimPaths, component};
@@ -45,6 +46,8 @@ struct Walk<'a> {
     channels: Channels,
     /// By camera of the file.
     lenses: BTreeMap<usize, Arc<LensKeys>>,
+    /// By light of the file.
+    strengths: BTreeMap<usize, Strength>,
     /// For each node of the file where it was placed first.
     placed: Vec<Option<u32>>,
     meshes: Meshes,
@@ -60,12 +63,13 @@ struct Walk<'a> {
 
 /// Compiles the nodes of the file's scene and everything at them.
 pub(super) fn compile(source: &Source, output: &mut Output) -> Result<(), Fault> {
-    let Animated { channels, weights, lenses } = animation::compile(source, output)?;
+    let Animated { channels, weights, lenses, strengths } = animation::compile(source, output)?;
     let mut walk = Walk {
         source,
         poses: Poses::new(source, output, &channels, weights)?,
         channels,
         lenses,
+        strengths,
         hanging: Vec::new(),
         placed: vec![None; source.document.nodes.len()],
         meshes: Meshes::new(source),
@@ -187,8 +191,11 @@ impl Walk<'_> {
         let mut values = lights::values(lux.as_ref(), object)?;
         let shaping = self.profiles.shaping(self.source, output, lux.as_ref(), object)?;
         let told = (lux.as_ref(), shaping);
-        let light = lights::of_node(self.source, output, number, told, node, object)?
+        let mut light = lights::of_node(self.source, output, number, told, node, object)?
             .map(|light| Light { values: values.take().map(Box::new), ..light });
+        if let Some(light) = &mut light {
+            lights::animate(self.source, output, number, light, &self.strengths)?;
+        }
         let has_light = light.is_some();
         if has_light {
             self.links.add_light(output, links)?;

@@ -1,6 +1,7 @@
 //! Lights that are not meshes: `KHR_lights_punctual`, and what `extras.usdLux` adds.
 
 use super::document::{UsdLux, UsdValues, label, reals};
+use super::strengths::Strength;
 use super::{Output, Source};
 use crate::ingest::error::Fault;
 use crate::ingest::image::{self, Coding};
@@ -11,6 +12,7 @@ use crate::scene::{
 };
 use gltf::json::extensions::scene::khr_lights_punctual::{Light as Row, Type};
 use gltf::json::validation::Checked;
+use std::collections::BTreeMap;
 use std::f32::consts::{FRAC_PI_2, FRAC_PI_4};
 
 /// More keys than this are refused: half a day of frames at 24 a second.
@@ -92,6 +94,37 @@ pub(super) fn of_node(
         note("its range is not positive; it has none".into());
     }
     Ok(Some(light(kind, range_m)))
+}
+
+/// Gives a light what animations say of it, unless it has values.
+pub(super) fn animate(
+    source: &Source,
+    output: &mut Output,
+    number: usize,
+    light: &mut Light,
+    strengths: &BTreeMap<usize, Strength>,
+) -> Result<(), Fault> {
+    let is_other = light.values.is_some() || matches!(light.kind, LightKind::Dome { .. });
+    let Some(index) = source.document.nodes[number].light.filter(|_| !is_other) else {
+        return Ok(());
+    };
+    let (Some(row), Some(strength)) = (source.document.get(index), strengths.get(&index.value()))
+    else {
+        return Ok(());
+    };
+    let object = label("light", index.value(), row.name.as_deref());
+    match strength.keys(row.color.into(), row.intensity, output.scene.timeline) {
+        Some(keys) => {
+            let bytes = keys.times_s.len() * size_of::<(f32, Rgb)>();
+            output.budget.take(bytes as u64, || object.clone())?;
+            light.values = Some(Box::new(keys));
+        }
+        None => {
+            let text = "is too strong for a 32-bit number at some time; it is constant";
+            output.notes.add(Category::Lights, object, text);
+        }
+    }
+    Ok(())
 }
 
 /// What a row of `KHR_lights_punctual` is, but for its range; `None` if that cannot be told.

@@ -122,9 +122,7 @@ impl Materials {
         self.emit(source, output, number, &object, &mut material);
         self.add_textures(source, output, number, &object, &mut material);
         if let Some(extension) = extensions.others.get(coat::NAME) {
-            let map = source.document.beside.normal_maps[number].as_ref();
-            let told = (extension, map);
-            material.coat = coat::compile(&mut self.textures, source, output, told, &object);
+            material.coat = coat::compile(&mut self.textures, source, output, extension, &object);
             if material.coat.is_some() && material.emits() {
                 let text = "its coat does not darken its light";
                 output.notes.add(Category::Lights, &*object, text);

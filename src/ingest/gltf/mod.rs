@@ -16,7 +16,7 @@
 //! | `instancing`, `geometry`, `attributes` | meshes |
 //! | `posing` | skins and morph targets |
 //! | `materials`, `glossiness`, `coat`, `glass`, `textures` | surfaces |
-//! | `lights`, `fog`, `cameras`, `lenses`, `animation` | what they say |
+//! | `lights`, `fog`, `cameras`, `lenses`, `strengths`, `animation` | what they say |
 //! | `links` | which lights light what |
 
 mod accessors;
@@ -41,6 +41,7 @@ mod links;
 mod materials;
 mod posing;
 mod profiles;
+mod strengths;
 mod textures;
 
 use super::budget::Budget;

@@ -21,13 +21,16 @@
 //! place of `diffuse`; where the glass is solid, that of `f_gloss + diffuse`.
 //!
 //! The coat is `KHR_materials_clearcoat`'s: `c` its strength, an index of 1.5, a roughness of its own. Where it is
-//! smooth, its albedo is Fresnel's term at `wo`, by which the extension darkens what is below.
+//! smooth, its albedo is Fresnel's term at `wo`, by which the extension darkens what is below. It may have a normal of
+//! its own: its cosines and its half vector are about that one, and it reflects on the side of that one; below the other
+//! horizon nothing else does. Where light passes glass it reflects on the side of both alone.
 //!
 //! So a white metal and a white dielectric, coated or not, reflect exactly what arrives (up to the table's
 //! interpolation), and `specular = 0` is exactly `base / pi`. The compensation and what is below another
 //! lobe look at `wo` alone: only Lambert and a lossless GGX (`alpha -> 0`) are reciprocal.
 
 pub mod albedo;
+mod coat;
 pub mod ggx;
 mod glass;
 #[cfg(test)]
@@ -37,6 +40,7 @@ use crate::light_tree::Lobes;
 use crate::math::color::{Rgb, luminance};
 use crate::math::{Frame, built_in, warp};
 use albedo::Albedo;
+use coat::{COAT_F0, Coat, reflected};
 use glam::{Vec2, Vec3};
 use glass::Glass;
 pub use glass::Passage;
@@ -45,9 +49,6 @@ use std::f32::consts::FRAC_1_PI;
 /// The smallest GGX alpha, reached at roughness 0.032: smoother surfaces reflect like this one, so
 /// that a mirror stays a finite lobe that next-event estimation can hit.
 pub const ALPHA_MIN: f32 = 1e-3;
-
-/// What a coat reflects at normal incidence: its index is 1.5.
-const COAT_F0: f32 = 0.04;
 
 /// A material at one point, textures looked up.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -77,8 +78,8 @@ pub struct SurfaceSample {
 impl SurfaceSample {
     /// The share of light that passes straight in a direction with this cosine to the normal: what neither the coat
     /// nor the specular lobe reflects, times the base colour. With [`Reflection::albedo`] it adds up to 1 where
-    /// everything is white.
-    pub fn tint(&self, cosine: f32) -> Rgb {
+    /// everything is white. `coat_cosine` is that to the coat's normal.
+    pub fn tint(&self, cosine: f32, coat_cosine: f32) -> Rgb {
         let bsdf = Bsdf::new(self, Frame::around(Vec3::Z));
         let whole = bsdf.passing;
         if whole == Rgb::ZERO || !bsdf.is_glossy() {
@@ -86,7 +87,7 @@ impl SurfaceSample {
         }
         let (gloss, _) = bsdf.gloss(Albedo::of_ggx(cosine, bsdf.alpha));
         let below = match bsdf.coat > 0.0 {
-            true => 1.0 - Coat::toward(cosine, bsdf.coat, bsdf.coat_alpha).0,
+            true => 1.0 - Coat::toward(coat_cosine, bsdf.coat, bsdf.coat_alpha).0,
             false => 1.0,
         };
         whole * (Rgb::ONE - gloss) * below
@@ -107,6 +108,8 @@ pub struct Bsdf {
     alpha: f32,
     coat: f32,
     coat_alpha: f32,
+    /// In the shading frame; +Z if it is the same.
+    coat_normal: Vec3,
     passage: Passage,
     /// The share of the surface that is solid glass.
     solid: f32,
@@ -142,30 +145,6 @@ pub struct Reflection {
     glass: Glass,
 }
 
-/// The coat's lobe. Its colour is `strength * (F0 + (1 - F0) * (1 - cos_h)^5)`.
-#[derive(Clone, Copy, Debug, Default)]
-struct Coat {
-    /// 0 is no coat.
-    strength: f32,
-    alpha: f32,
-    /// Of choosing it.
-    probability: f32,
-}
-
-impl Coat {
-    /// Its reflectance toward a direction, and the lobe with the probability still open.
-    fn toward(cos_o: f32, strength: f32, alpha: f32) -> (f32, Coat) {
-        let part = Albedo::of_ggx(cos_o, alpha);
-        let lost = (1.0 - part.a - part.b).max(0.0) / (part.a + part.b);
-        let coat = Coat { strength: strength * (1.0 + COAT_F0 * lost), alpha, probability: 0.0 };
-        (coat.albedo(part).min(1.0), coat)
-    }
-
-    fn albedo(&self, part: Albedo) -> f32 {
-        self.strength * (COAT_F0 * part.a + part.b)
-    }
-}
-
 impl Bsdf {
     /// The reflection of `sample` about the shading frame. Values outside their range are clamped
     /// into it; what is not finite counts as 0.
@@ -187,9 +166,19 @@ impl Bsdf {
             alpha: (roughness * roughness).max(ALPHA_MIN),
             coat: if built_in::GLOSSY { unit(sample.coat) } else { 0.0 },
             coat_alpha: unit(sample.coat_roughness).powi(2).max(ALPHA_MIN),
+            coat_normal: Vec3::Z,
             passage: sample.passage,
             solid: if is_solid { (1.0 - metallic) * transmission } else { 0.0 },
         }
+    }
+
+    /// The same with a coat that has a normal of its own, if one is given: unit, world space.
+    pub fn coated_about(self, normal: Option<Vec3>) -> Bsdf {
+        let Some(normal) = normal else { return self };
+        let local = self.frame.to_local(normal).normalize_or(Vec3::Z);
+        // To the last bits it is the same.
+        let is_same = local.truncate().length_squared() < f32::EPSILON * f32::EPSILON;
+        Bsdf { coat_normal: if is_same && local.z > 0.0 { Vec3::Z } else { local }, ..self }
     }
 
     /// Whether it has a specular lobe. Without one it is Lambertian.
@@ -237,7 +226,7 @@ impl Bsdf {
             diffuse: Rgb::ZERO,
             alpha: self.alpha,
             specular_probability: None,
-            coat: Coat::default(),
+            coat: Coat::NONE,
             glass: Glass::default(),
         };
         if wo.z <= 0.0 {
@@ -262,10 +251,11 @@ impl Bsdf {
             + (Rgb::ONE - self.metal_f0) * metal_gain * self.metallic;
         let mut specular = (gloss * whole + metal * self.metallic).element_sum();
         let mut coat_part = 0.0;
-        if self.coat > 0.0 {
-            let (reflected, coat) = Coat::toward(wo.z, self.coat, self.coat_alpha);
+        let coat_cosine = if self.coat_normal == Vec3::Z { wo.z } else { wo.dot(self.coat_normal) };
+        if self.coat > 0.0 && coat_cosine > 0.0 {
+            let (reflected, coat) = Coat::toward(coat_cosine, self.coat, self.coat_alpha);
             let below = 1.0 - reflected;
-            reflection.coat = coat;
+            reflection.coat = Coat { normal: self.coat_normal, ..coat };
             reflection.diffuse *= below;
             reflection.at_normal *= below;
             reflection.toward_grazing *= below;
@@ -300,10 +290,12 @@ impl Reflection {
     pub fn sample(&self, u_lobe: f32, u: Vec2) -> Option<BsdfSample> {
         let specular = self.specular_probability?;
         let coat = self.coat.probability;
-        let wi = if built_in::GLOSSY && u_lobe < specular + coat {
-            let alpha = if u_lobe < specular { self.alpha } else { self.coat.alpha };
-            let h = ggx::sample_normal(self.wo, alpha, u);
-            (2.0 * self.wo.dot(h) * h - self.wo).normalize()
+        let wi = if built_in::GLOSSY && u_lobe < specular {
+            reflected(self.wo, ggx::sample_normal(self.wo, self.alpha, u))?
+        } else if built_in::GLOSSY && u_lobe < specular + coat {
+            let wi = self.coat.sample(self.wo, u)?;
+            // Beyond glass is what passes alone.
+            (wi.z > 0.0 || !self.transmits()).then_some(wi)?
         } else if built_in::TRANSMISSION && u_lobe < specular + coat + self.glass.probability {
             let u_side = (u_lobe - specular - coat) / self.glass.probability;
             self.glass.sample(self.wo, u_side, u)
@@ -318,10 +310,11 @@ impl Reflection {
         }
     }
 
-    /// Its lobes, as picking lights asks for them; `None` if nothing is reflected. Of a coat and what is below,
+    /// Its lobes, as picking lights asks for them, and the normal of the glossy one, unit, world space; `None` if nothing
+    /// is reflected. Of a coat and what is below,
     /// the one that is brighter at its peak is the glossy lobe, and the other counts as diffuse: a bright peak is
     /// what must not be missed.
-    pub fn lobes(&self) -> Option<Lobes> {
+    pub fn lobes(&self) -> Option<(Lobes, Vec3)> {
         self.specular_probability?;
         let base = Lobes {
             diffuse: luminance(self.diffuse) / FRAC_1_PI,
@@ -330,7 +323,7 @@ impl Reflection {
             alpha: self.alpha,
         };
         if self.coat.strength == 0.0 {
-            return Some(base);
+            return Some((base, self.frame.normal));
         }
         let coat = Lobes {
             diffuse: base.diffuse,
@@ -339,10 +332,16 @@ impl Reflection {
             alpha: self.coat.alpha,
         };
         let peak = |lobes: &Lobes| lobes.at_normal / (lobes.alpha * lobes.alpha);
-        let (glossy, other) = if peak(&coat) > peak(&base) { (coat, base) } else { (base, coat) };
-        let part = Albedo::of_ggx(self.wo.z, other.alpha);
+        let is_coat = peak(&coat) > peak(&base);
+        let (glossy, other) = if is_coat { (coat, base) } else { (base, coat) };
+        let cosine = if is_coat { self.wo.z } else { self.coat_cosine() };
+        let part = Albedo::of_ggx(cosine, other.alpha);
         let beside = other.at_normal * (part.a + part.b) + other.toward_grazing * part.b;
-        Some(Lobes { diffuse: glossy.diffuse + beside, ..glossy })
+        let about = match is_coat && self.coat.is_bent() {
+            true => self.frame.to_outer(self.coat.normal),
+            false => self.frame.normal,
+        };
+        Some((Lobes { diffuse: glossy.diffuse + beside, ..glossy }, about))
     }
 
     /// Reflectance of the specular lobes and of the diffuse one; their sum is the share of a white
@@ -357,9 +356,20 @@ impl Reflection {
             specular = self.at_normal * (part.a + part.b) + self.toward_grazing * part.b;
         }
         if self.coat.strength > 0.0 {
-            specular += self.coat.albedo(Albedo::of_ggx(self.wo.z, self.coat.alpha));
+            specular += self.coat.albedo(Albedo::of_ggx(self.coat_cosine(), self.coat.alpha));
         }
         (specular, self.diffuse / FRAC_1_PI)
+    }
+
+    fn coat_cosine(&self) -> f32 {
+        if self.coat.is_bent() { self.wo.dot(self.coat.normal) } else { self.wo.z }
+    }
+
+    /// Whether light from below the horizon of [`normal`](Self::normal) may be reflected: by a coat that has a normal of
+    /// its own.
+    #[inline]
+    pub fn has_two_horizons(&self) -> bool {
+        built_in::GLOSSY && self.coat.is_bent()
     }
 
     /// Both together, and what passes glass.
@@ -403,6 +413,10 @@ impl Reflection {
             false => (Rgb::ZERO, 0.0),
         };
         if cos_i <= 0.0 {
+            if self.has_two_horizons() && !self.transmits() {
+                let (value, pdf) = self.coat.eval_bent(self.wo, wi);
+                return (Rgb::splat(value), pdf);
+            }
             return (glass.0, glass.1 * self.glass.probability);
         }
         let mut value = self.diffuse * cos_i;
@@ -416,8 +430,12 @@ impl Reflection {
                 |alpha| ggx::distribution(h, alpha) * ggx::visibility_cos(cos_o, cos_i, alpha);
             value += (self.at_normal + self.toward_grazing * schlick) * shape(self.alpha);
             pdf += specular_probability * ggx::reflection_pdf(cos_o, h, self.alpha);
-            let Coat { strength, alpha, probability } = self.coat;
-            if strength > 0.0 {
+            let Coat { strength, alpha, probability, .. } = self.coat;
+            if self.has_two_horizons() {
+                let (coat, density) = self.coat.eval_bent(self.wo, wi);
+                value += coat;
+                pdf += density;
+            } else if strength > 0.0 {
                 value += strength * (COAT_F0 + (1.0 - COAT_F0) * schlick) * shape(alpha);
                 pdf += probability * ggx::reflection_pdf(cos_o, h, alpha);
             }

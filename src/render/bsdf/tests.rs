@@ -1,6 +1,7 @@
 //! Laws: energy, densities, limits. The Monte Carlo here is a fixed Hammersley set, so a failure
 //! is a failure every time.
 
+mod coat;
 mod glass;
 
 use super::*;

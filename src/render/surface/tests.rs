@@ -69,6 +69,8 @@ fn factors_multiply_textures_and_vertex_colours() {
             factor_texture: USED,
             roughness: 0.8,
             roughness_texture: USED,
+            normal_texture: None,
+            normal_scale: 1.0,
         }),
         opacity: 0.8,
         alpha_mode: AlphaMode::Blend,
@@ -173,6 +175,48 @@ fn normals_and_maps_do_not_know_the_size_of_their_node() {
     for decade in -30..=16 {
         assert!((normal(10f64.powi(decade)) - normal(1.0)).length() < 1e-6, "1e{decade}");
     }
+}
+
+/// A coat without a map follows the mesh, whatever map is below it; one that has the same map shares the frame.
+#[test]
+fn a_coat_has_its_own_normals() {
+    let coat = |normal_texture, normal_scale| Coat {
+        factor: 1.0,
+        factor_texture: None,
+        roughness: 0.0,
+        roughness_texture: None,
+        normal_texture,
+        normal_scale,
+    };
+    let smooth = Vec3::new(0.3, 0.2, 1.0).normalize();
+    let surface = |below, coat, wo| {
+        let mut mesh = square();
+        mesh.normals = vec![smooth; 4];
+        let material = Material { normal_texture: below, coat: Some(coat), ..Default::default() };
+        let mut scene = scene_of(mesh, material, DVec3::ONE);
+        scene.textures.push(texture(Pixels::Linear8(vec![[229, 128, 202, 255]; 2])));
+        seen(&scene, MIDDLE, wo)
+    };
+    for wo in [Vec3::Z, -Vec3::Z] {
+        let bent = surface(USED, coat(USED, 1.0), wo);
+        assert_eq!(bent.coat_normal, None);
+        let bent = bent.frame.normal;
+        assert_eq!(surface(None, coat(None, 1.0), wo).coat_normal, None);
+        let above = surface(USED, coat(None, 1.0), wo);
+        assert_eq!(above.frame.normal, bent);
+        assert!(above.coat_normal.unwrap().distance(smooth * wo.z) < 1e-6);
+        let own = surface(None, coat(USED, 1.0), wo);
+        assert_eq!(own.coat_normal, Some(bent));
+        assert!(own.frame.normal.distance(smooth * wo.z) < 1e-6);
+        let less = surface(USED, coat(USED, 0.5), wo).coat_normal.unwrap();
+        let angle = |normal: Vec3| normal.angle_between(smooth * wo.z);
+        assert!(angle(less) > 0.1 && angle(less) < 0.8 * angle(bent), "{less} {bent}");
+        assert!(surface(USED, coat(None, 1.0), wo).bsdf().toward(wo).has_two_horizons());
+        assert!(!surface(USED, coat(USED, 1.0), wo).bsdf().toward(wo).has_two_horizons());
+    }
+    // Without strength there is no coat to be bent.
+    let gone = Coat { factor: 0.0, ..coat(None, 1.0) };
+    assert_eq!(surface(USED, gone, Vec3::Z).coat_normal, None);
 }
 
 #[test]

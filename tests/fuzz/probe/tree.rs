@@ -73,7 +73,8 @@ fn ask_all(frame: &FrameTree, is_sound: bool) {
     ask(frame, &receiver, is_sound);
     let receiver = Receiver { point: middle, ..receiver };
     let lobes = Lobes { diffuse: 0.5, at_normal: 0.04, toward_grazing: 0.5, alpha: 0.2 };
-    ask(frame, &Glossy { receiver, to_eye: Vec3::Y, lobes, toward: Vec3::Z }, is_sound);
+    let (about, to_eye, toward) = (receiver.normal, Vec3::Y, Vec3::Z);
+    ask(frame, &Glossy { receiver, about, to_eye, lobes, toward }, is_sound);
     ask(frame, &Segment { origin: Vec3::ZERO, direction: Vec3::X, length: 2.0 }, is_sound);
 }
 

@@ -138,6 +138,13 @@ impl Document {
         let number = if wanted < self.scenes.len() { wanted } else { 0 };
         Some((number, self.scenes.get(number)?))
     }
+
+    /// How many lights `KHR_lights_punctual` lists.
+    pub(super) fn light_count(&self) -> usize {
+        let extensions = self.extensions.as_ref();
+        let punctual = extensions.and_then(|all| all.khr_lights_punctual.as_ref());
+        punctual.map_or(0, |punctual| punctual.lights.len())
+    }
 }
 
 /// The image of a texture; the crate gives one without the number that no row has.

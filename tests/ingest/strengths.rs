@@ -1,0 +1,190 @@
+//! Lights that animations make brighter, darker or of another colour.
+
+use crate::files::{File, lamp};
+use candelabra::scene::{Interpolation, Keys, Scene};
+use glam::{DVec3, Vec3};
+use serde_json::json;
+
+const COLOR: &str = "/extensions/KHR_lights_punctual/lights/0/color";
+const INTENSITY: &str = "/extensions/KHR_lights_punctual/lights/0/intensity";
+
+/// A lamp, and a point light of 2 candela times a colour at a node of its own.
+fn file() -> File {
+    let mut file = lamp();
+    file.light(json!({"type": "point", "color": [1, 0.5, 0.25], "intensity": 2}));
+    file
+}
+
+fn animate(file: &mut File, pointer: &str, times: &[f32], values: &[f32], how: &str) {
+    let shape = if pointer.ends_with("color") { "VEC3" } else { "SCALAR" };
+    let (input, output) = (file.times(times), file.floats(values, shape));
+    file.add(
+        "animations",
+        json!({
+            "samplers": [{"input": input, "output": output, "interpolation": how}],
+            "channels": [{"sampler": 0, "target": {"path": "pointer", "extensions": {
+                "KHR_animation_pointer": {"pointer": pointer}}}}],
+        }),
+    );
+}
+
+#[track_caller]
+fn load(file: &File) -> Scene {
+    file.load().unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// The keys of the light of a scene that is read without a note.
+#[track_caller]
+fn keys(scene: &Scene) -> &Keys<Vec3> {
+    assert!(scene.notes.is_empty(), "{:?}", scene.notes);
+    assert_eq!(scene.lights.len(), 1);
+    scene.lights[0].values.as_ref().expect("it is constant")
+}
+
+#[test]
+fn an_intensity_or_a_colour_is_animated() {
+    for (how, interpolation) in [("LINEAR", Interpolation::Linear), ("STEP", Interpolation::Step)] {
+        let mut file = file();
+        animate(&mut file, INTENSITY, &[0.0, 0.5, 2.0], &[2.0, 8.0, 0.0], how);
+        let scene = load(&file);
+        let found = keys(&scene);
+        assert_eq!(
+            (&found.times_s[..], found.interpolation),
+            (&[0.0, 0.5, 2.0][..], interpolation)
+        );
+        let color = Vec3::new(1.0, 0.5, 0.25);
+        assert_eq!(found.values, [2.0 * color, 8.0 * color, Vec3::ZERO]);
+        assert_eq!(candelabra::pipeline::frames_of(&scene).len(), 49);
+        assert!(scene.has_lights_that_change());
+    }
+    let mut file = file();
+    animate(&mut file, COLOR, &[0.0, 1.0], &[1.0, 0.0, 0.0, 0.0, 0.5, 1.0], "LINEAR");
+    let scene = load(&file);
+    assert_eq!(keys(&scene).values, [Vec3::X * 2.0, Vec3::new(0.0, 1.0, 2.0)]);
+}
+
+#[test]
+fn what_does_not_vary_is_constant() {
+    let mut file = file();
+    animate(&mut file, INTENSITY, &[0.0, 1.0], &[5.0, 5.0], "LINEAR");
+    let scene = load(&file);
+    assert_eq!(keys(&scene).values, [Vec3::new(5.0, 2.5, 1.25)]);
+    assert!(!scene.has_lights_that_change());
+}
+
+/// The value of a spline from one key to the next, by its definition.
+fn hermite(t: f64, [a, out, b, into]: [f64; 4]) -> f64 {
+    let (t2, t3) = (t * t, t * t * t);
+    (2.0 * t3 - 3.0 * t2 + 1.0) * a
+        + (t3 - 2.0 * t2 + t) * out
+        + (3.0 * t2 - 2.0 * t3) * b
+        + (t3 - t2) * into
+}
+
+/// Colour and intensity each have their own keys and ways between them; at each frame the light is their product.
+#[test]
+fn colour_and_intensity_are_multiplied_frame_by_frame() {
+    let blue = |second: f64| second.clamp(0.0, 1.0);
+    for how in ["LINEAR", "STEP", "CUBICSPLINE"] {
+        let mut file = file();
+        animate(&mut file, COLOR, &[0.0, 1.0], &[1.0, 0.0, 0.0, 1.0, 0.0, 1.0], "LINEAR");
+        let values: &[f32] = match how {
+            "CUBICSPLINE" => &[0.0, 4.0, -9.0, -40.0, 1.0, 0.0],
+            _ => &[4.0, 1.0],
+        };
+        animate(&mut file, INTENSITY, &[0.25, 1.25], values, how);
+        let scene = load(&file);
+        let found = keys(&scene);
+        assert!(found.times_s.is_sorted_by(|a, b| a < b));
+        for frame in -3..60 {
+            let second = f64::from(frame) / 24.0;
+            let share = (second - 0.25).clamp(0.0, 1.0);
+            let intensity = match how {
+                "LINEAR" => 4.0 - 3.0 * share,
+                "STEP" => {
+                    if share < 1.0 {
+                        4.0
+                    } else {
+                        1.0
+                    }
+                }
+                _ => hermite(share, [4.0, -9.0, 1.0, -40.0]).max(0.0),
+            };
+            let value = found.at(second, scene.timeline);
+            let expected = DVec3::new(1.0, 0.0, blue(second)) * intensity;
+            assert!((value - expected).length() < 2e-5, "{how} {frame}: {value} {expected}");
+        }
+    }
+    // Both held: held as ever.
+    let mut file = file();
+    animate(&mut file, COLOR, &[0.0, 1.0], &[1.0, 0.0, 0.0, 0.0, 1.0, 0.0], "STEP");
+    animate(&mut file, INTENSITY, &[0.5, 2.0], &[3.0, 1.0], "STEP");
+    let scene = load(&file);
+    let found = keys(&scene);
+    assert_eq!(found.interpolation, Interpolation::Step);
+    assert_eq!(found.times_s, [0.0, 0.5, 1.0, 2.0]);
+    assert_eq!(found.values, [Vec3::X * 3.0, Vec3::X * 3.0, Vec3::Y * 3.0, Vec3::Y]);
+}
+
+#[test]
+fn a_spline_that_goes_below_zero_is_dark() {
+    let mut file = file();
+    animate(&mut file, INTENSITY, &[0.0, 2.0], &[0.0, 1.0, -50.0, 0.0, 1.0, 0.0], "CUBICSPLINE");
+    let scene = load(&file);
+    let found = keys(&scene);
+    assert!(found.values.iter().all(|value| value.min_element() >= 0.0));
+    assert!(found.values.contains(&Vec3::ZERO) && found.times_s.len() > 40);
+}
+
+#[test]
+fn values_of_extras_take_the_place_of_animations() {
+    let mut file = file();
+    animate(&mut file, INTENSITY, &[0.0, 1.0], &[1.0, 5.0], "LINEAR");
+    let values = json!({"times": [0, 1], "rgb": [[7, 7, 7], [8, 8, 8]]});
+    file.lux(json!({"type": "SphereLight", "inputs": {}, "values": values}));
+    let scene = load(&file);
+    let light = scene.lights.iter().find(|light| light.values.is_some()).unwrap();
+    assert_eq!(light.values.as_ref().unwrap().values[0], Vec3::splat(7.0));
+}
+
+#[test]
+fn animations_of_lights_that_are_broken() {
+    type Break = fn(&mut File);
+    let cases: [(Break, &str); 6] = [
+        (
+            |f| animate(f, INTENSITY, &[0.0, 1.0], &[1.0, -1.0], "LINEAR"),
+            "intensities that are negative",
+        ),
+        (|f| animate(f, COLOR, &[0.0], &[1.0, -1.0, 0.0], "STEP"), "negative in part"),
+        (|f| animate(f, INTENSITY, &[0.0, 1.0], &[1.0], "LINEAR"), "2 keys, but 1"),
+        (|f| animate(f, INTENSITY, &[0.0, 1.0], &[1.0, f32::NAN], "LINEAR"), "not finite"),
+        (
+            |f| {
+                let pointer = "/extensions/KHR_lights_punctual/lights/9/intensity";
+                animate(f, pointer, &[0.0], &[1.0], "STEP");
+            },
+            "could move",
+        ),
+        (
+            |f| {
+                let pointer = "/extensions/KHR_lights_punctual/lights/0/range";
+                animate(f, pointer, &[0.0], &[1.0], "STEP");
+            },
+            "this part of a light is not read",
+        ),
+    ];
+    for (change, text) in cases {
+        let mut file = file();
+        change(&mut file);
+        let scene = load(&file);
+        let [note] = scene.notes.as_slice() else { panic!("{text}: {:?}", scene.notes) };
+        assert!(note.to_string().contains(text), "{note}");
+        let varies = scene.lights[0].values.as_deref().is_some_and(Keys::varies);
+        assert!(!varies, "{text}");
+    }
+    let mut file = file();
+    animate(&mut file, INTENSITY, &[0.0, 1.0], &[1.0, 3e38], "LINEAR");
+    file.json["extensions"]["KHR_lights_punctual"]["lights"][0]["color"] = json!([9, 1, 1]);
+    let scene = load(&file);
+    assert!(scene.notes[0].to_string().contains("too strong"), "{:?}", scene.notes);
+}
