@@ -236,8 +236,10 @@ def _written(value) -> float | list[float]:
 
 
 def _varies(column: np.ndarray) -> bool:
-    """Whether rows differ by more than single precision's noise."""
-    return bool(np.abs(column - column[0]).max() > NOISE * np.abs(column).max())
+    """Whether rows differ by more than single precision's noise, in any of their numbers."""
+    numbers_of = np.reshape(column, (len(column), -1))
+    apart = np.abs(numbers_of - numbers_of[0]).max(axis=0)
+    return bool((apart > NOISE * np.abs(numbers_of).max(axis=0)).any())
 
 
 def _finite(values: np.ndarray) -> np.ndarray:

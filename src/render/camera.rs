@@ -117,7 +117,7 @@ impl CameraRays {
     }
 
     /// Where a world-space point is on the picture, seen through the middle of the lens: pixels to the
-    /// right and up from where the view axis is. `None` behind a perspective camera.
+    /// right and up from its top left corner. `None` behind a perspective camera.
     pub fn project(&self, point: DVec3) -> Option<DVec2> {
         self.on_film(point - self.position.as_dvec3())
     }
@@ -130,14 +130,13 @@ impl CameraRays {
 
     fn on_film(&self, toward: DVec3) -> Option<DVec2> {
         let [right, up, forward] = [self.right, self.up, self.forward].map(|axis| axis.as_dvec3());
-        let on_film = DVec2::new(toward.dot(right), toward.dot(up)) / f64::from(self.pixel_m);
-        match self.optics {
-            Optics::Parallel => Some(on_film),
-            _ => {
-                let depth = toward.dot(forward);
-                (depth > 0.0).then(|| on_film / depth)
-            }
-        }
+        let depth = match self.optics {
+            Optics::Parallel => 1.0,
+            _ => toward.dot(forward),
+        };
+        let on_film = DVec2::new(toward.dot(right), toward.dot(up)) / depth;
+        let from_corner = (on_film - self.corner_m.as_dvec2()) / f64::from(self.pixel_m);
+        (depth > 0.0).then_some(from_corner)
     }
 }
 

@@ -1,7 +1,7 @@
 //! Lights that animations make brighter, darker or of another colour.
 
 use crate::files::{File, lamp};
-use candelabra::scene::{Interpolation, Keys, Scene};
+use candelabra::scene::{Interpolation, Keys, Scene, Timeline};
 use glam::{DVec3, Vec3};
 use serde_json::json;
 
@@ -124,6 +124,32 @@ fn colour_and_intensity_are_multiplied_frame_by_frame() {
     assert_eq!(found.interpolation, Interpolation::Step);
     assert_eq!(found.times_s, [0.0, 0.5, 1.0, 2.0]);
     assert_eq!(found.values, [Vec3::X * 3.0, Vec3::X * 3.0, Vec3::Y * 3.0, Vec3::Y]);
+}
+
+/// Times are rounded by who writes them, and by 32 bits: what counts as at a frame jumps at that frame, whatever the other part does.
+#[test]
+fn a_part_that_jumps_at_a_frame_jumps_there() {
+    let frame = |number: i32| f64::from(number) / 24.0;
+    for number in [1, 2, 5, 7, 100, 1001, 100_001] {
+        let nearest = frame(number) as f32;
+        let decimals = ((frame(number) * 1e6).round() / 1e6) as f32;
+        let mut times = vec![nearest, nearest.next_up(), nearest.next_down(), decimals];
+        times.retain(|&time| Timeline::default().is_same(frame(number), time.into()));
+        for (early, late) in times.iter().flat_map(|&a| times.iter().map(move |&b| (a, b))) {
+            for how in ["LINEAR", "STEP"] {
+                let mut file = file();
+                let colors = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0];
+                animate(&mut file, COLOR, &[0.0, early], &colors, how);
+                animate(&mut file, INTENSITY, &[0.0, late], &[3.0, 5.0], "STEP");
+                let scene = load(&file);
+                let at = |number| keys(&scene).at(frame(number), scene.timeline);
+                let (before, after) = (at(number - 1), at(number));
+                assert!((after - DVec3::Y * 5.0).length() < 1e-5, "{number} {how}: {after}");
+                // Red and green are one in all, and before the jump three times as strong.
+                assert!((before.element_sum() - 3.0).abs() < 1e-4, "{number} {how}: {before}");
+            }
+        }
+    }
 }
 
 #[test]

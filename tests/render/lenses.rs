@@ -219,6 +219,28 @@ fn a_zoom_moves_what_is_seen() {
     }
 }
 
+/// An offset of the film moves the whole picture the other way, what is infinitely far too.
+#[test]
+fn a_shift_of_the_film_moves_what_is_seen() {
+    let film_offset = keys([Vec2::ZERO, Vec2::new(0.125, -0.0625)]);
+    let mut stage = card(LensKeys { film_offset, ..LensKeys::default() });
+    stage.scene.timeline.frames_per_second = 1.0;
+    stage.scene.nodes[0].local = at(DVec3::new(0.0, 0.0, -FAR_M));
+    let settings = RenderSettings { aovs: vec![Aov::Motion], ..looked(16) };
+    let set = Set::of(&stage.scene, &[1, 2]);
+    let (first, second) = (set.render(&settings, 1), set.render(&settings, 2));
+    let size = COLUMNS as f32;
+    for (buffers, way, sign) in [(&first, "forward", 1.0), (&second, "backward", -1.0)] {
+        for (axis, expected) in [("u", -0.125 * size), ("v", 0.0625 * size)] {
+            let found: Vec<f32> = buffers.channel(&format!("{way}.{axis}")).unwrap().collect();
+            assert!(
+                found.iter().all(|found| (found - sign * expected).abs() < 1e-3),
+                "{way} {axis}: {found:?}"
+            );
+        }
+    }
+}
+
 /// What is hidden from where is learned of what the camera sees.
 #[test]
 fn a_learned_table_knows_the_lens_over_time() {

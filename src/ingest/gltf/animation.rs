@@ -166,8 +166,10 @@ fn can_move(document: &Document, moves: Moved, path: &str) -> bool {
         Moved::Camera(camera) if path == YFOV => {
             document.cameras.get(camera).is_some_and(|camera| camera.perspective.is_some())
         }
+        // One that is both is read as perspective.
         Moved::Camera(camera) => {
-            document.beside.magnifications.get(camera).is_some_and(Option::is_some)
+            document.cameras.get(camera).is_some_and(|camera| camera.perspective.is_none())
+                && document.beside.magnifications.get(camera).is_some_and(Option::is_some)
         }
         Moved::Light(light) => light < document.light_count(),
     }

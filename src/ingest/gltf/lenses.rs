@@ -96,9 +96,11 @@ pub(super) fn apply(
             (None, _) => lens.height = Some(keys),
             (Some(yfov_rad), Projection::Perspective { .. }) => {
                 camera.projection = Projection::Perspective { yfov_rad };
+                lens.height = None;
             }
             (Some(height_m), Projection::Orthographic { .. }) => {
                 camera.projection = Projection::Orthographic { height_m };
+                lens.height = None;
             }
         },
     }

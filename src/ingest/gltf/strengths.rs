@@ -81,8 +81,10 @@ impl Strength {
     }
 
     fn product(&self, color: Rgb, intensity: f32, timeline: Timeline) -> Keys<Rgb> {
-        let colors = self.color.as_ref().map(|keys| (&keys.times_s, keys.interpolation));
-        let intensities = self.intensity.as_ref().map(|keys| (&keys.times_s, keys.interpolation));
+        let own_colors = self.color.as_ref().map(|keys| on_frames(keys, timeline));
+        let own_intensities = self.intensity.as_ref().map(|keys| on_frames(keys, timeline));
+        let colors = own_colors.as_ref().map(|keys| (&keys.times_s, keys.interpolation));
+        let intensities = own_intensities.as_ref().map(|keys| (&keys.times_s, keys.interpolation));
         let parts = || colors.iter().chain(&intensities);
         let is_held = parts().all(|(_, interpolation)| *interpolation == Interpolation::Step);
         let mut times: Vec<f32> = parts().flat_map(|(times, _)| times.iter().copied()).collect();
@@ -102,12 +104,12 @@ impl Strength {
         }
         times.dedup();
         let value = |&time: &f32| {
-            let color = self.color.as_ref().map_or(color, |keys| match keys.interpolation {
+            let color = own_colors.as_ref().map_or(color, |keys| match keys.interpolation {
                 Interpolation::Step => held(keys, time),
                 _ => keys.at(time.into(), timeline).as_vec3(),
             });
             let intensity =
-                self.intensity.as_ref().map_or(intensity, |keys| match keys.interpolation {
+                own_intensities.as_ref().map_or(intensity, |keys| match keys.interpolation {
                     Interpolation::Step => held(keys, time),
                     _ => keys.at(time.into(), timeline) as f32,
                 });
@@ -118,6 +120,15 @@ impl Strength {
         let interpolation = if is_held { Interpolation::Step } else { Interpolation::Linear };
         Keys { times_s: times, values, interpolation }
     }
+}
+
+/// The same keys, those that count as at a frame exactly at it: a part that jumps there jumps with the other.
+fn on_frames<T: Clone>(keys: &Keys<T>, timeline: Timeline) -> Keys<T> {
+    let time = |&time: &f32| {
+        let frame_s = timeline.seconds_at(timeline.frame_at(time.into()).round());
+        if timeline.is_same(time.into(), frame_s) { frame_s as f32 } else { time }
+    };
+    Keys { times_s: keys.times_s.iter().map(time).collect(), ..keys.clone() }
 }
 
 /// The value of the last key at a time or before it; exactly, not as near as frames are.

@@ -5,7 +5,8 @@ use super::Real;
 use gltf::json::extensions::scene::khr_lights_punctual::Light;
 use gltf::json::{Camera, Extras, Index, Mesh, Skin};
 use serde::Deserialize;
-use serde_json::value::RawValue;
+use serde_json::Value;
+use serde_json::value::{RawValue, to_raw_value};
 use std::borrow::Cow;
 
 /// A node of the file.
@@ -49,16 +50,17 @@ struct Plain<'a> {
     rotation: Option<Box<[Real; 4]>>,
     scale: Option<Box<[Real; 3]>>,
     mesh: Option<Number>,
-    extensions: Option<Extensions>,
+    #[serde(borrow)]
+    extensions: Option<&'a RawValue>,
     #[serde(borrow)]
     extras: Option<&'a RawValue>,
 }
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Extensions {
-    #[serde(rename = "KHR_lights_punctual")]
-    punctual: Option<Punctual>,
+struct Extensions<'a> {
+    #[serde(borrow, rename = "KHR_lights_punctual")]
+    punctual: Option<&'a RawValue>,
 }
 
 #[derive(Deserialize)]
@@ -86,12 +88,29 @@ impl Number {
     }
 }
 
+/// An object; serde would take a list for one, too.
+fn object<'a, T: Deserialize<'a>>(json: &'a str) -> Option<T> {
+    json.trim_start().starts_with('{').then(|| serde_json::from_str(json).ok()).flatten()
+}
+
+/// An object that may be absent; `None` if it cannot be read.
+fn within<'a, T: Deserialize<'a>>(json: Option<&'a RawValue>) -> Option<Option<T>> {
+    json.map_or(Some(None), |json| object(json.get()).map(Some))
+}
+
+/// As all objects are read: of members with one name the last is kept.
+fn rewritten(json: &RawValue) -> serde_json::Result<Box<RawValue>> {
+    to_raw_value(&serde_json::from_str::<Value>(json.get())?)
+}
+
 impl Node {
     /// Of a node that says only what most do and nothing wrong; `None` for any other.
     pub(super) fn plain(json: &str) -> Option<Node> {
-        let plain: Plain = serde_json::from_str(json).ok()?;
+        let plain: Plain = object(json)?;
         let Plain { matrix, translation, rotation, scale, .. } = plain;
-        let punctual = plain.extensions.and_then(|extensions| extensions.punctual);
+        let extensions: Option<Extensions> = within(plain.extensions)?;
+        let punctual = extensions.and_then(|extensions| extensions.punctual);
+        let punctual: Option<Punctual> = within(punctual)?;
         let children = plain.children.unwrap_or_default();
         Some(Node {
             name: plain.name.map(|name| name.into()),
@@ -99,7 +118,7 @@ impl Node {
             transform: Transform { matrix, translation, rotation, scale },
             mesh: plain.mesh.map(Number::index),
             light: punctual.map(|punctual| punctual.light.index()),
-            extras: plain.extras.map(ToOwned::to_owned),
+            extras: plain.extras.map(rewritten).transpose().ok()?,
             rare: None,
         })
     }
@@ -146,9 +165,10 @@ mod tests {
     /// A node as a file with it and another one is read: by the way of all objects, if a member that no one knows is
     /// put into it.
     fn read(node: &str, is_plain: bool) -> (String, String) {
+        let end = if node == "{}" { r#""unknown": 0}"# } else { r#", "unknown": 0}"# };
         let node = match is_plain {
             true => node.to_string(),
-            false => node.replacen('{', r#"{"unknown": 0, "#, 1).replace(", }", "}"),
+            false => format!("{}{end}", &node[..node.len() - 1]),
         };
         assert!(is_plain || Node::plain(&node).is_none());
         let json = format!(r#"{{"asset": {{"version": "2.0"}}, "nodes": [{node}, {{}}]}}"#);
@@ -186,7 +206,12 @@ mod tests {
                 r#""extensions": {{"KHR_lights_punctual": {{"light": {n}}}}}"#
             )),
             Just(r#""extras": {"n":[1,2.5],"usdPath":"/a"}"#.to_string()),
+            Just(r#""extras": {"usdLux":{"radius":1,"radius":2},"n":1e-7}"#.to_string()),
+            Just(r#""extras": {"n":1e999}"#.to_string()),
+            Just(r#""extras": {"\ud800":1}"#.to_string()),
             Just(r#""extensions": {}"#.to_string()),
+            Just(r#""extensions": [[5]]"#.to_string()),
+            Just(r#""extensions": {"KHR_lights_punctual": [5]}"#.to_string()),
         ]
     }
 
