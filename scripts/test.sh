@@ -8,6 +8,14 @@ set -eu
 cd "$(dirname "$0")/.."
 . scripts/environment.sh
 
+# Under nohup, and in the background of a script, a program is deaf to SIGHUP or SIGINT, which some tests send.
+hearing() {
+    "$python" -c 'import os, signal, sys
+for number in (signal.SIGHUP, signal.SIGINT):
+    signal.signal(number, signal.SIG_DFL)
+os.execvp(sys.argv[1], sys.argv[1:])' "$@"
+}
+
 echo "== format"
 cargo fmt --check
 echo "== lints"
@@ -17,13 +25,13 @@ RUSTDOCFLAGS="-D warnings" cargo doc --quiet --no-deps --document-private-items
 # Before the Rust tests: one of them exports a stage.
 environment scripts/requirements.txt scripts/requirements-test.txt
 echo "== tests"
-cargo test --quiet
+hearing cargo test --quiet
 echo "== exporter"
 "$python" -m pytest --quiet tests/exporter
 echo "== farms"
 # RQD's own dependences are for desktops.
 "$python" -m pip install --quiet --disable-pip-version-check --no-deps opencue_rqd==1.37.0
-"$python" -m pytest --quiet -rs tests/farm
+hearing "$python" -m pytest --quiet -rs tests/farm
 echo "== pages"
 "$python" -m pytest --quiet -rs tests/pages
 echo "all checks pass"
