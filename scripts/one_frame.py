@@ -100,7 +100,7 @@ def row(programs, folder, count, kind):
     render += ["--res", "8x8", "--spp", "1", "--depth", "1"]
     (without, without_mb), (with_, with_mb) = cost(render), cost(render + ["--tree", tree])
     size = tree.stat().st_size / 2**20
-    return f"| {count} | {kind} | {without:.2f} s, {without_mb:.0f} MB | {with_:.2f} s, {with_mb:.0f} MB | {size:.1f} MB |"
+    return f"| {int(count):,} | {kind} | {without:.2f} s, {without_mb:.0f} MB | {with_:.2f} s, {with_mb:.0f} MB | {size:.1f} MB |"
 
 
 def main():
