@@ -58,6 +58,20 @@ impl File {
         )
     }
 
+    /// Animates what a pointer names.
+    pub fn animate(&mut self, pointer: &str, times: &[f32], values: &[f32], how: &str) {
+        let shape = if pointer.ends_with("color") { "VEC3" } else { "SCALAR" };
+        let (input, output) = (self.times(times), self.floats(values, shape));
+        self.add(
+            "animations",
+            json!({
+                "samplers": [{"input": input, "output": output, "interpolation": how}],
+                "channels": [{"sampler": 0, "target": {"path": "pointer", "extensions": {
+                    "KHR_animation_pointer": {"pointer": pointer}}}}],
+            }),
+        );
+    }
+
     /// Adds an accessor of floats.
     pub fn floats(&mut self, values: &[f32], shape: &str) -> usize {
         let bytes: Vec<u8> = values.iter().flat_map(|value| value.to_le_bytes()).collect();

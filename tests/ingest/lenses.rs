@@ -156,10 +156,10 @@ fn a_table_that_makes_no_sense_is_left_out_and_noted() {
             json!({"times": [0, 1], "fStop": [1, 1e-39], "focalLength_m": [1, 1]}),
             "no possible radius",
         ),
-        (json!({"times": [0, 1e39], "yfov": [0.5, 0.6]}), "usdCamera is not read"),
-        (json!({"times": [0, 1], "yfov": ["a", "b"]}), "usdCamera is not read"),
-        (json!([0, 1]), "usdCamera is not read"),
-        (json!({"yfov": [0.5, 0.6]}), "usdCamera is not read"),
+        (json!({"times": [0, 1e39], "yfov": [0.5, 0.6]}), "its lens is constant"),
+        (json!({"times": [0, 1], "yfov": ["a", "b"]}), "its lens is constant"),
+        (json!([0, 1]), "its lens is constant"),
+        (json!({"yfov": [0.5, 0.6]}), "its lens is constant"),
     ] {
         let extras = json!({"focusDistance_m": 2, "values": values.clone()});
         let scene = usd(perspective(), extras);
@@ -177,19 +177,6 @@ fn a_table_that_makes_no_sense_is_left_out_and_noted() {
     assert!(keys.height.is_none() && keys.exposure_scale.is_some());
 }
 
-/// Animates what a pointer names.
-fn animate(file: &mut File, pointer: &str, times: &[f32], values: &[f32], how: &str) {
-    let (input, output) = (file.times(times), file.floats(values, "SCALAR"));
-    file.add(
-        "animations",
-        json!({
-            "samplers": [{"input": input, "output": output, "interpolation": how}],
-            "channels": [{"sampler": 0, "target": {"path": "pointer", "extensions": {
-                "KHR_animation_pointer": {"pointer": pointer}}}}],
-        }),
-    );
-}
-
 #[test]
 fn a_field_of_view_is_animated_by_a_pointer() {
     for (how, values) in [
@@ -202,7 +189,7 @@ fn a_field_of_view_is_animated_by_a_pointer() {
         let node = json!({"camera": 0, "name": "other"});
         let number = file.add("nodes", node);
         file.json["scenes"][0]["nodes"].as_array_mut().unwrap().push(json!(number));
-        animate(&mut file, YFOV, &[0.0, 2.0], values, how);
+        file.animate(YFOV, &[0.0, 2.0], values, how);
         let scene = load(&file);
         assert!(scene.notes.is_empty(), "{:?}", scene.notes);
         let [one, other] = &scene.cameras[..] else { panic!() };
@@ -228,7 +215,7 @@ fn a_field_of_view_is_animated_by_a_pointer() {
 #[test]
 fn an_orthographic_height_is_animated_by_a_pointer() {
     let mut file = file(orthographic(), json!({}));
-    animate(&mut file, YMAG, &[0.0, 1.0], &[1.0, 4.0], "LINEAR");
+    file.animate(YMAG, &[0.0, 1.0], &[1.0, 4.0], "LINEAR");
     let camera = only(load(&file));
     assert_eq!(lens(&camera).height.as_ref().unwrap().values, [2.0, 8.0]);
 }
@@ -236,7 +223,7 @@ fn an_orthographic_height_is_animated_by_a_pointer() {
 #[test]
 fn an_animation_that_says_one_thing_is_a_constant() {
     let mut file = file(perspective(), json!({}));
-    animate(&mut file, YFOV, &[0.0, 1.0], &[0.75, 0.75], "LINEAR");
+    file.animate(YFOV, &[0.0, 1.0], &[0.75, 0.75], "LINEAR");
     let camera = only(load(&file));
     assert_eq!(camera, Camera::perspective(camera.node, 0.75));
 }
@@ -245,7 +232,7 @@ fn an_animation_that_says_one_thing_is_a_constant() {
 fn extras_take_the_place_of_an_animation_and_leave_the_rest() {
     let with = |values: Value| {
         let mut file = file(perspective(), json!({ "values": values }));
-        animate(&mut file, YFOV, &[0.0, 1.0], &[0.5, 0.75], "LINEAR");
+        file.animate(YFOV, &[0.0, 1.0], &[0.5, 0.75], "LINEAR");
         lens(&only(load(&file))).height.as_ref().unwrap().values.clone()
     };
     assert_eq!(with(json!({"times": [0, 1], "yfov": [0.1, 0.2]})), [0.1, 0.2]);
@@ -256,16 +243,16 @@ fn extras_take_the_place_of_an_animation_and_leave_the_rest() {
 fn animations_of_lenses_that_are_broken() {
     type Break = fn(&mut File);
     let cases: [(Break, &str); 8] = [
-        (|f| animate(f, YFOV, &[0.0, 1.0], &[0.5, 4.0], "LINEAR"), "not between 0 and pi"),
-        (|f| animate(f, YFOV, &[0.0, 1.0], &[0.5, 0.0], "STEP"), "not between 0 and pi"),
-        (|f| animate(f, YMAG, &[0.0, 1.0], &[1.0, 2.0], "LINEAR"), "could move"),
-        (|f| animate(f, "/cameras/7/perspective/yfov", &[0.0], &[0.5], "STEP"), "could move"),
-        (|f| animate(f, "/cameras/0/perspective/zfar", &[0.0], &[0.5], "STEP"), "part of a lens"),
-        (|f| animate(f, "/cameras/x/perspective/yfov", &[0.0], &[0.5], "STEP"), "part of a lens"),
-        (|f| animate(f, YFOV, &[0.0, 1.0], &[0.5], "LINEAR"), "2 keys, but 1"),
+        (|f| f.animate(YFOV, &[0.0, 1.0], &[0.5, 4.0], "LINEAR"), "not between 0 and pi"),
+        (|f| f.animate(YFOV, &[0.0, 1.0], &[0.5, 0.0], "STEP"), "not between 0 and pi"),
+        (|f| f.animate(YMAG, &[0.0, 1.0], &[1.0, 2.0], "LINEAR"), "could move"),
+        (|f| f.animate("/cameras/7/perspective/yfov", &[0.0], &[0.5], "STEP"), "could move"),
+        (|f| f.animate("/cameras/0/perspective/zfar", &[0.0], &[0.5], "STEP"), "part of a lens"),
+        (|f| f.animate("/cameras/x/perspective/yfov", &[0.0], &[0.5], "STEP"), "part of a lens"),
+        (|f| f.animate(YFOV, &[0.0, 1.0], &[0.5], "LINEAR"), "2 keys, but 1"),
         (
             |f| {
-                animate(f, YFOV, &[0.0, 1.0], &[0.5, 0.75], "LINEAR");
+                f.animate(YFOV, &[0.0, 1.0], &[0.5, 0.75], "LINEAR");
                 let accessors = f.json["accessors"].as_array_mut().unwrap();
                 let last = accessors.last_mut().unwrap();
                 (last["type"], last["count"]) = (json!("VEC2"), json!(1));
@@ -283,8 +270,8 @@ fn animations_of_lenses_that_are_broken() {
     }
     // Of two animations the first is read.
     let mut file = file(perspective(), json!({}));
-    animate(&mut file, YFOV, &[0.0, 1.0], &[0.5, 0.75], "LINEAR");
-    animate(&mut file, YFOV, &[0.0, 1.0], &[0.25, 0.75], "LINEAR");
+    file.animate(YFOV, &[0.0, 1.0], &[0.5, 0.75], "LINEAR");
+    file.animate(YFOV, &[0.0, 1.0], &[0.25, 0.75], "LINEAR");
     let scene = load(&file);
     assert!(scene.notes[0].to_string().contains("only the first animation"), "{:?}", scene.notes);
     assert_eq!(lens(&scene.cameras[0]).height.as_ref().unwrap().values[0], 0.5);

@@ -15,19 +15,6 @@ fn file() -> File {
     file
 }
 
-fn animate(file: &mut File, pointer: &str, times: &[f32], values: &[f32], how: &str) {
-    let shape = if pointer.ends_with("color") { "VEC3" } else { "SCALAR" };
-    let (input, output) = (file.times(times), file.floats(values, shape));
-    file.add(
-        "animations",
-        json!({
-            "samplers": [{"input": input, "output": output, "interpolation": how}],
-            "channels": [{"sampler": 0, "target": {"path": "pointer", "extensions": {
-                "KHR_animation_pointer": {"pointer": pointer}}}}],
-        }),
-    );
-}
-
 #[track_caller]
 fn load(file: &File) -> Scene {
     file.load().unwrap_or_else(|error| panic!("{error}"))
@@ -45,7 +32,7 @@ fn keys(scene: &Scene) -> &Keys<Vec3> {
 fn an_intensity_or_a_colour_is_animated() {
     for (how, interpolation) in [("LINEAR", Interpolation::Linear), ("STEP", Interpolation::Step)] {
         let mut file = file();
-        animate(&mut file, INTENSITY, &[0.0, 0.5, 2.0], &[2.0, 8.0, 0.0], how);
+        file.animate(INTENSITY, &[0.0, 0.5, 2.0], &[2.0, 8.0, 0.0], how);
         let scene = load(&file);
         let found = keys(&scene);
         assert_eq!(
@@ -58,7 +45,7 @@ fn an_intensity_or_a_colour_is_animated() {
         assert!(scene.has_lights_that_change());
     }
     let mut file = file();
-    animate(&mut file, COLOR, &[0.0, 1.0], &[1.0, 0.0, 0.0, 0.0, 0.5, 1.0], "LINEAR");
+    file.animate(COLOR, &[0.0, 1.0], &[1.0, 0.0, 0.0, 0.0, 0.5, 1.0], "LINEAR");
     let scene = load(&file);
     assert_eq!(keys(&scene).values, [Vec3::X * 2.0, Vec3::new(0.0, 1.0, 2.0)]);
 }
@@ -66,7 +53,7 @@ fn an_intensity_or_a_colour_is_animated() {
 #[test]
 fn what_does_not_vary_is_constant() {
     let mut file = file();
-    animate(&mut file, INTENSITY, &[0.0, 1.0], &[5.0, 5.0], "LINEAR");
+    file.animate(INTENSITY, &[0.0, 1.0], &[5.0, 5.0], "LINEAR");
     let scene = load(&file);
     assert_eq!(keys(&scene).values, [Vec3::new(5.0, 2.5, 1.25)]);
     assert!(!scene.has_lights_that_change());
@@ -87,12 +74,12 @@ fn colour_and_intensity_are_multiplied_frame_by_frame() {
     let blue = |second: f64| second.clamp(0.0, 1.0);
     for how in ["LINEAR", "STEP", "CUBICSPLINE"] {
         let mut file = file();
-        animate(&mut file, COLOR, &[0.0, 1.0], &[1.0, 0.0, 0.0, 1.0, 0.0, 1.0], "LINEAR");
+        file.animate(COLOR, &[0.0, 1.0], &[1.0, 0.0, 0.0, 1.0, 0.0, 1.0], "LINEAR");
         let values: &[f32] = match how {
             "CUBICSPLINE" => &[0.0, 4.0, -9.0, -40.0, 1.0, 0.0],
             _ => &[4.0, 1.0],
         };
-        animate(&mut file, INTENSITY, &[0.25, 1.25], values, how);
+        file.animate(INTENSITY, &[0.25, 1.25], values, how);
         let scene = load(&file);
         let found = keys(&scene);
         assert!(found.times_s.is_sorted_by(|a, b| a < b));
@@ -117,8 +104,8 @@ fn colour_and_intensity_are_multiplied_frame_by_frame() {
     }
     // Both held: held as ever.
     let mut file = file();
-    animate(&mut file, COLOR, &[0.0, 1.0], &[1.0, 0.0, 0.0, 0.0, 1.0, 0.0], "STEP");
-    animate(&mut file, INTENSITY, &[0.5, 2.0], &[3.0, 1.0], "STEP");
+    file.animate(COLOR, &[0.0, 1.0], &[1.0, 0.0, 0.0, 0.0, 1.0, 0.0], "STEP");
+    file.animate(INTENSITY, &[0.5, 2.0], &[3.0, 1.0], "STEP");
     let scene = load(&file);
     let found = keys(&scene);
     assert_eq!(found.interpolation, Interpolation::Step);
@@ -139,8 +126,8 @@ fn a_part_that_jumps_at_a_frame_jumps_there() {
             for how in ["LINEAR", "STEP"] {
                 let mut file = file();
                 let colors = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0];
-                animate(&mut file, COLOR, &[0.0, early], &colors, how);
-                animate(&mut file, INTENSITY, &[0.0, late], &[3.0, 5.0], "STEP");
+                file.animate(COLOR, &[0.0, early], &colors, how);
+                file.animate(INTENSITY, &[0.0, late], &[3.0, 5.0], "STEP");
                 let scene = load(&file);
                 let at = |number| keys(&scene).at(frame(number), scene.timeline);
                 let (before, after) = (at(number - 1), at(number));
@@ -155,7 +142,7 @@ fn a_part_that_jumps_at_a_frame_jumps_there() {
 #[test]
 fn a_spline_that_goes_below_zero_is_dark() {
     let mut file = file();
-    animate(&mut file, INTENSITY, &[0.0, 2.0], &[0.0, 1.0, -50.0, 0.0, 1.0, 0.0], "CUBICSPLINE");
+    file.animate(INTENSITY, &[0.0, 2.0], &[0.0, 1.0, -50.0, 0.0, 1.0, 0.0], "CUBICSPLINE");
     let scene = load(&file);
     let found = keys(&scene);
     assert!(found.values.iter().all(|value| value.min_element() >= 0.0));
@@ -165,7 +152,7 @@ fn a_spline_that_goes_below_zero_is_dark() {
 #[test]
 fn values_of_extras_take_the_place_of_animations() {
     let mut file = file();
-    animate(&mut file, INTENSITY, &[0.0, 1.0], &[1.0, 5.0], "LINEAR");
+    file.animate(INTENSITY, &[0.0, 1.0], &[1.0, 5.0], "LINEAR");
     let values = json!({"times": [0, 1], "rgb": [[7, 7, 7], [8, 8, 8]]});
     file.lux(json!({"type": "SphereLight", "inputs": {}, "values": values}));
     let scene = load(&file);
@@ -178,23 +165,23 @@ fn animations_of_lights_that_are_broken() {
     type Break = fn(&mut File);
     let cases: [(Break, &str); 6] = [
         (
-            |f| animate(f, INTENSITY, &[0.0, 1.0], &[1.0, -1.0], "LINEAR"),
+            |f| f.animate(INTENSITY, &[0.0, 1.0], &[1.0, -1.0], "LINEAR"),
             "intensities that are negative",
         ),
-        (|f| animate(f, COLOR, &[0.0], &[1.0, -1.0, 0.0], "STEP"), "negative in part"),
-        (|f| animate(f, INTENSITY, &[0.0, 1.0], &[1.0], "LINEAR"), "2 keys, but 1"),
-        (|f| animate(f, INTENSITY, &[0.0, 1.0], &[1.0, f32::NAN], "LINEAR"), "not finite"),
+        (|f| f.animate(COLOR, &[0.0], &[1.0, -1.0, 0.0], "STEP"), "negative in part"),
+        (|f| f.animate(INTENSITY, &[0.0, 1.0], &[1.0], "LINEAR"), "2 keys, but 1"),
+        (|f| f.animate(INTENSITY, &[0.0, 1.0], &[1.0, f32::NAN], "LINEAR"), "not finite"),
         (
             |f| {
                 let pointer = "/extensions/KHR_lights_punctual/lights/9/intensity";
-                animate(f, pointer, &[0.0], &[1.0], "STEP");
+                f.animate(pointer, &[0.0], &[1.0], "STEP");
             },
             "could move",
         ),
         (
             |f| {
                 let pointer = "/extensions/KHR_lights_punctual/lights/0/range";
-                animate(f, pointer, &[0.0], &[1.0], "STEP");
+                f.animate(pointer, &[0.0], &[1.0], "STEP");
             },
             "this part of a light is not read",
         ),
@@ -209,8 +196,28 @@ fn animations_of_lights_that_are_broken() {
         assert!(!varies, "{text}");
     }
     let mut file = file();
-    animate(&mut file, INTENSITY, &[0.0, 1.0], &[1.0, 3e38], "LINEAR");
+    file.animate(INTENSITY, &[0.0, 1.0], &[1.0, 3e38], "LINEAR");
     file.json["extensions"]["KHR_lights_punctual"]["lights"][0]["color"] = json!([9, 1, 1]);
     let scene = load(&file);
     assert!(scene.notes[0].to_string().contains("too strong"), "{:?}", scene.notes);
+}
+
+/// Keys at each frame of a long time, of many lights by the same few bytes: more memory than the file may ask for.
+#[test]
+fn strengths_at_many_frames_are_refused_before_they_are_made() {
+    let mut file = file();
+    file.animate(COLOR, &[0.0, 1e6], &[1.0, 0.0, 0.0, 0.0, 1.0, 0.0], "LINEAR");
+    file.animate(INTENSITY, &[0.0, 1e6], &[1.0, 2.0], "LINEAR");
+    let light = file.json["extensions"]["KHR_lights_punctual"]["lights"][0].clone();
+    let animations = file.json["animations"].as_array().unwrap().clone();
+    for number in 1..400 {
+        let lights = &mut file.json["extensions"]["KHR_lights_punctual"]["lights"];
+        lights.as_array_mut().unwrap().push(light.clone());
+        for animation in &animations {
+            let own = animation.to_string().replace("/lights/0/", &format!("/lights/{number}/"));
+            file.add("animations", serde_json::from_str(&own).unwrap());
+        }
+    }
+    let error = file.load().unwrap_err().to_string();
+    assert!(error.contains("light ") && error.contains("more bytes of memory"), "{error}");
 }

@@ -6,9 +6,10 @@ use super::accessors::Accessor;
 use super::document::{Document, Node, Target, label};
 use super::lenses::{self, YFOV, YMAG};
 use super::posing::Weights;
-use super::strengths::{COLOR, INTENSITY, Strength};
+use super::strengths::{self, COLOR, INTENSITY, Strength};
 use super::{Output, Source};
 use crate::ingest::error::Fault;
+use crate::math::color::Rgb;
 use crate::scene::{Category, Channel, Interpolation, Keys, LensKeys};
 use glam::{Quat, Vec3};
 use gltf::json::accessor::{ComponentType, Type};
@@ -38,7 +39,7 @@ pub(super) struct Animated {
     /// Of the cameras whose height is animated.
     pub lenses: BTreeMap<usize, Arc<LensKeys>>,
     /// Of the lights whose colour or intensity is animated.
-    pub strengths: BTreeMap<usize, Strength>,
+    pub strengths: BTreeMap<usize, Keys<Rgb>>,
 }
 
 /// What a channel animates a part of, by its number in the file.
@@ -141,8 +142,7 @@ pub(super) fn compile(source: &Source, output: &mut Output) -> Result<Animated, 
             }
         }
     }
-    // Of some nothing could be read.
-    strengths.retain(|_, strength| strength.is_animated());
+    let strengths = strengths::compile(strengths, source, output)?;
     Ok(Animated { channels, weights, lenses, strengths })
 }
 

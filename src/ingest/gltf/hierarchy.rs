@@ -7,11 +7,11 @@ use super::lights::{self, Placed};
 use super::links::LinkTable;
 use super::posing::{Hung, Pose, Poses};
 use super::profiles::Profiles;
-use super::strengths::Strength;
 use super::{Output, Source, cameras, fog, instancing};
 use crate::ingest::error::Fault;
 use crate::ingest::paths::{PrimPaths, component};
-use crate::scene::{Category, Channel, Instance, LensKeys, Light, Links, Node, Trs};
+use crate::math::color::Rgb;
+use crate::scene::{Category, Channel, Instance, Keys, LensKeys, Light, Links, Node, Trs};
 use glam::{DAffine3, DMat4, DQuat, DVec3};
 use gltf::json::{Index, Mesh};
 use std::collections::{BTreeMap, HashMap};
@@ -47,7 +47,7 @@ struct Walk<'a> {
     /// By camera of the file.
     lenses: BTreeMap<usize, Arc<LensKeys>>,
     /// By light of the file.
-    strengths: BTreeMap<usize, Strength>,
+    strengths: BTreeMap<usize, Keys<Rgb>>,
     /// For each node of the file where it was placed first.
     placed: Vec<Option<u32>>,
     meshes: Meshes,

@@ -63,13 +63,18 @@ pub(super) fn apply(
     object: &str,
     output: &mut Output,
 ) -> Result<(), Fault> {
-    let Some(told) = &usd.values else { return Ok(()) };
+    let Some(values) = &usd.values else { return Ok(()) };
     let mut note = |problem: String| {
         let text = format!("extras.usdCamera.values: {problem}");
         output.notes.add(Category::Cameras, object, text);
     };
-    let table = match Table::new(told) {
-        Ok(table) => table,
+    let read = || {
+        let told: UsdLens =
+            serde_json::from_str(values.get()).map_err(|error| error.to_string())?;
+        Ok::<_, String>((Table::new(&told)?, told))
+    };
+    let (table, told) = match read() {
+        Ok(read) => read,
         Err(problem) => {
             note(format!("{problem}; its lens is constant"));
             return Ok(());
@@ -104,7 +109,7 @@ pub(super) fn apply(
             }
         },
     }
-    match table.lens(usd, told, matches!(camera.projection, Projection::Orthographic { .. })) {
+    match table.lens(usd, &told, matches!(camera.projection, Projection::Orthographic { .. })) {
         Err(problem) => say(&problem),
         Ok(None) => {}
         Ok(Some(Optics { radii, focus })) => {

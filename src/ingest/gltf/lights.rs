@@ -1,7 +1,6 @@
 //! Lights that are not meshes: `KHR_lights_punctual`, and what `extras.usdLux` adds.
 
 use super::document::{UsdLux, UsdValues, label, reals};
-use super::strengths::Strength;
 use super::{Output, Source};
 use crate::ingest::error::Fault;
 use crate::ingest::image::{self, Coding};
@@ -102,28 +101,16 @@ pub(super) fn animate(
     output: &mut Output,
     number: usize,
     light: &mut Light,
-    strengths: &BTreeMap<usize, Strength>,
+    strengths: &BTreeMap<usize, Keys<Rgb>>,
 ) -> Result<(), Fault> {
     let is_other = light.values.is_some() || matches!(light.kind, LightKind::Dome { .. });
     let Some(index) = source.document.nodes[number].light.filter(|_| !is_other) else {
         return Ok(());
     };
-    let (Some(row), Some(strength)) = (source.document.get(index), strengths.get(&index.value()))
-    else {
-        return Ok(());
-    };
-    let object = label("light", index.value(), row.name.as_deref());
-    match strength.keys(row.color.into(), row.intensity, output.scene.timeline) {
-        Some(keys) => {
-            let bytes = keys.times_s.len() * size_of::<(f32, Rgb)>();
-            output.budget.take(bytes as u64, || object.clone())?;
-            light.values = Some(Box::new(keys));
-        }
-        None => {
-            let text = "is too strong for a 32-bit number at some time; it is constant";
-            output.notes.add(Category::Lights, object, text);
-        }
-    }
+    let Some(keys) = strengths.get(&index.value()) else { return Ok(()) };
+    let bytes = keys.times_s.len() * size_of::<(f32, Rgb)>();
+    output.budget.take(bytes as u64, || label("light", index.value(), None))?;
+    light.values = Some(Box::new(keys.clone()));
     Ok(())
 }
 

@@ -6,9 +6,15 @@
 
 use super::accessors::Accessor;
 use super::animation::Track;
+use super::document::label;
+use super::{Output, Source};
+use crate::ingest::error::Fault;
 use crate::math::color::Rgb;
-use crate::scene::{Interpolation, Keys, Timeline};
+use crate::scene::{Category, Interpolation, Keys, Timeline};
 use glam::Vec3;
+use gltf::json::Index;
+use gltf::json::extensions::scene::khr_lights_punctual::Light;
+use std::collections::BTreeMap;
 
 /// The animated colour of a light.
 pub(super) const COLOR: &str = "color";
@@ -55,14 +61,22 @@ impl Strength {
         Ok(())
     }
 
-    /// Whether any part is.
-    pub(super) fn is_animated(&self) -> bool {
-        self.color.is_some() || self.intensity.is_some()
+    /// At most so many keys are made of it; none if no part is animated.
+    fn most_keys(&self, timeline: Timeline) -> usize {
+        let color = self.color.as_ref().map(|keys| &keys.times_s);
+        let intensity = self.intensity.as_ref().map(|keys| &keys.times_s);
+        let own: usize = color.iter().chain(&intensity).map(|times| times.len()).sum();
+        let seconds = || color.into_iter().chain(intensity).flatten().map(|&time| f64::from(time));
+        let (first, last) =
+            (seconds().fold(f64::MAX, f64::min), seconds().fold(f64::MIN, f64::max));
+        let frames = timeline.frame_at(last) - timeline.frame_at(first);
+        // Two of each that jumps.
+        2 * own + frames.clamp(0.0, MOST_FRAMES) as usize
     }
 
-    /// The strength over time of what is animated, of which one of colour and intensity may be constant. `None` if it is too strong for a
-    /// 32-bit number.
-    pub(super) fn keys(&self, color: Rgb, intensity: f32, timeline: Timeline) -> Option<Keys<Rgb>> {
+    /// The strength over time. The constants stand for what is not animated. `None` if it is too strong for a 32-bit
+    /// number.
+    fn keys(&self, color: Rgb, intensity: f32, timeline: Timeline) -> Option<Keys<Rgb>> {
         let color = color.max(Rgb::ZERO);
         let keys = match (&self.color, &self.intensity) {
             (Some(keys), None) if keys.interpolation != Interpolation::Cubic => Keys {
@@ -120,6 +134,37 @@ impl Strength {
         let interpolation = if is_held { Interpolation::Step } else { Interpolation::Linear };
         Keys { times_s: times, values, interpolation }
     }
+}
+
+/// The strengths of the lights of the file that are animated, each once, however many nodes have the light.
+///
+/// # Errors
+/// If their keys are too many to be kept.
+pub(super) fn compile(
+    animated: BTreeMap<usize, Strength>,
+    source: &Source,
+    output: &mut Output,
+) -> Result<BTreeMap<usize, Keys<Rgb>>, Fault> {
+    let timeline = output.scene.timeline;
+    let mut strengths = BTreeMap::new();
+    for (number, strength) in animated {
+        let Some(row) = source.document.get(Index::<Light>::new(number as u32)) else { continue };
+        let object = label("light", number, row.name.as_deref());
+        let bytes = strength.most_keys(timeline) * size_of::<(f32, Rgb)>();
+        // Of some nothing could be read.
+        if bytes == 0 {
+            continue;
+        }
+        output.budget.take(bytes as u64, || object.clone())?;
+        match strength.keys(row.color.into(), row.intensity, timeline) {
+            Some(keys) => _ = strengths.insert(number, keys),
+            None => {
+                let text = "is too strong for a 32-bit number at some time; it is constant";
+                output.notes.add(Category::Lights, object, text);
+            }
+        }
+    }
+    Ok(strengths)
 }
 
 /// The same keys, those that count as at a frame exactly at it: a part that jumps there jumps with the other.

@@ -37,7 +37,8 @@ pub(in crate::ingest::gltf) struct UsdCamera {
     pub shutter: Option<[Real; 2]>,
     #[serde(default)]
     pub hidden: bool,
-    pub values: Option<UsdLens>,
+    /// Read by itself: what is wrong with it is nothing that is wrong with the constants.
+    pub values: Option<Box<RawValue>>,
 }
 
 /// `extras.usdCamera.values`: what of the lens varies, one value for each time.
