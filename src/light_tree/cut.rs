@@ -44,8 +44,8 @@ impl Picked {
 /// The part of the relative variance that no opening removes: shadows, textures, whatever no estimate
 /// of the tree accounts for.
 const UNKNOWN: f64 = 0.04;
-/// An entry with a smaller weight is late: a sixteenth of it is seen, or less.
-const LATE: f64 = 0.25;
+/// An entry with a smaller weight is late: less than a quarter of it is seen. By measurement: see `docs/visibility.md`.
+const LATE: f64 = 0.5;
 
 /// Buffers for a cut and for walks below it, to be reused.
 #[derive(Debug)]
