@@ -123,9 +123,9 @@ fn a_pilot_is_as_large_as_the_error_makes_the_frame() {
 fn exposure_does_not_show_in_the_knobs() {
     let stage = floor_under_points(0.4);
     let set = stage.set();
-    let plain = knobs_to(0.02, &set, 1.0);
+    let plain = knobs_to(0.005, &set, 1.0);
     assert_ne!(plain, Knobs::default());
     for scale in [1.0 / 1024.0, 1024.0] {
-        assert_eq!(knobs_to(0.02, &set, scale), plain);
+        assert_eq!(knobs_to(0.005, &set, scale), plain);
     }
 }

@@ -137,8 +137,8 @@ impl Sketch {
     /// About so many of its cells, or all, spread evenly.
     pub fn some(&self, pixels: u32) -> Vec<u32> {
         let every = (self.cells() / pixels.max(1)).max(1);
-        let is_one = |cell: &u32| (cell % self.columns + 3 * (cell / self.columns)) % every == 0;
-        (0..self.cells()).filter(is_one).collect()
+        let place = |cell: &u32| cell % self.columns + 3 * (cell / self.columns);
+        (0..self.cells()).filter(|cell| place(cell).is_multiple_of(every)).collect()
     }
 
     /// The squared error of each pixel.
