@@ -51,8 +51,15 @@ def processor_seconds():
 
 
 class Reference:
-    def __init__(self, shot, samples):
+    """A converged picture in two halves, kept in a file if one is given."""
+
+    def __init__(self, shot, samples, kept=None):
+        if kept and kept.exists():
+            self.halves = list(np.load(kept))
+            return
         self.halves = [shot.render("--spp", samples, "--seed", seed)[0] for seed in (7001, 7002)]
+        if kept:
+            np.save(kept, np.array(self.halves))
 
     def error(self, light, grey):
         """The error of a picture, without that of the reference."""
@@ -67,11 +74,10 @@ def root(squares):
     return math.sqrt(max(0.0, sum(squares) / len(squares)))
 
 
-def measure(shot, samples, seeds, errors):
-    reference = Reference(shot, samples)
+def measure(shot, reference, seeds, errors, told_at):
     grey = shot.render("--error", 10, "--spp", 8)[1]["noise"]["grey"]
     rows = {"told": {}, "asked": {}, "grey": grey}
-    for count in (16, 64, 256):
+    for count in told_at:
         told, true = [], []
         for seed in range(seeds):
             light, done, _ = shot.render("--spp", count, "--grey", grey, "--seed", seed)
@@ -105,7 +111,9 @@ def main():
     parser.add_argument("--depth", default="1")
     parser.add_argument("--reference", type=int, default=8192, help="samples of each half of the converged picture")
     parser.add_argument("--seeds", type=int, default=4, help="pictures of each kind")
-    parser.add_argument("--errors", type=float, nargs="+", default=[0.1, 0.05, 0.02])
+    parser.add_argument("--errors", type=float, nargs="*", default=[0.1, 0.05, 0.02])
+    parser.add_argument("--counts", type=int, nargs="*", default=[16, 64, 256], help="for told over true error")
+    parser.add_argument("--references", type=Path, help="folder to keep converged pictures in, for further runs")
     parser.add_argument("--table", type=Path, help="JSON file for the results")
     options = parser.parse_args()
     results = {}
@@ -113,9 +121,10 @@ def main():
         with tempfile.TemporaryDirectory() as folder:
             knobs = ["--res", options.res, "--depth", options.depth]
             shot = Shot(str(options.programs / "candelabra-render"), scene, knobs, folder)
-            results[Path(scene).stem] = rows = measure(
-                shot, options.reference, options.seeds, options.errors
-            )
+            name = f"{Path(scene).stem}_{options.res}_{options.depth}_{options.reference}.npy"
+            kept = options.references and options.references / name
+            reference = Reference(shot, options.reference, kept)
+            results[Path(scene).stem] = rows = measure(shot, reference, options.seeds, options.errors, options.counts)
         for count, (told, true) in rows["told"].items():
             print(f"{Path(scene).stem:16} {count:4} samples: told {told:.4f}, true {true:.4f}, ratio {told / true:.3f}")
         for asked, row in rows["asked"].items():

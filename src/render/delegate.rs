@@ -244,8 +244,12 @@ impl<'a> RenderDelegate<'a> {
     pub fn film(&self, frame: i32) -> Result<Film, PlanError> {
         let plan = self.plan.as_ref().map_err(Clone::clone)?;
         let size = [self.settings.width, self.settings.height];
-        let camera = self.scene.camera_at(&self.camera, frame.into());
-        Ok(Film::new(size, plan, camera.exposure_scale))
+        Ok(Film::new(size, plan, self.exposure_scale(frame)))
+    }
+
+    /// What a picture is over radiance.
+    pub(super) fn exposure_scale(&self, frame: i32) -> f32 {
+        self.scene.camera_at(&self.camera, frame.into()).exposure_scale
     }
 
     /// Renders one frame, or the part of it that is to be rendered, with the same number of samples in

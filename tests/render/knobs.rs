@@ -3,9 +3,13 @@
 use crate::rooms;
 use crate::stage::{Set, Stage, by, direct, facing, lambert};
 use crate::strategies::{SIZE, disagreement, render};
-use candelabra::render::knob::pilot;
+use candelabra::math::color::luminance;
+use candelabra::render::beauty::Beauty;
+use candelabra::render::knob::{Aim, pilot};
+use candelabra::render::noise::Grey;
+use candelabra::render::passes::ErrorGoal;
 use candelabra::render::{Knobs, LightStrategy, RenderDelegate, RenderSettings, Split};
-use candelabra::scene::LightKind;
+use candelabra::scene::{Camera, LightKind};
 use glam::{DVec3, Vec3};
 
 /// Paths enough for a pilot.
@@ -16,7 +20,7 @@ fn plenty(depth: u32) -> RenderSettings {
 fn knobs(set: &Set, settings: RenderSettings) -> Knobs {
     let camera = set.scene.cameras[0].clone();
     let delegate = RenderDelegate::new(set.scene, &set.emitters, camera, settings);
-    pilot(&delegate, &set.tree, 1, None).unwrap()
+    pilot(&delegate, &set.tree, 1, Aim::Even).unwrap()
 }
 
 /// A floor under a lattice of points, so far above each other that they are like one or not.
@@ -87,17 +91,41 @@ fn a_knob_that_is_given_is_kept() {
     assert_eq!(knobs(&set, few), Knobs::default());
 }
 
+/// The knobs of a frame that is rendered to an error, by a camera whose exposure is scaled.
+fn knobs_to(error: f64, set: &Set, exposure_scale: f32) -> Knobs {
+    let settings = RenderSettings { samples: 16_384, ..direct(48, 0) };
+    let camera = Camera { exposure_scale, ..set.scene.cameras[0].clone() };
+    let mut delegate = RenderDelegate::new(set.scene, &set.emitters, camera, settings.clone());
+    delegate.set_settings(RenderSettings {
+        samples: 1,
+        split: Split::Fixed(1.0),
+        ..settings.clone()
+    });
+    let picture = delegate.render(&set.tree, 1, &()).unwrap().buffers;
+    let lights = Beauty::of(&picture, false).pixels;
+    let grey = Grey::of(lights.into_iter().map(|light| luminance(light).into()));
+    delegate.set_settings(settings);
+    let goal = ErrorGoal { error, grey, most: 16_384 };
+    pilot(&delegate, &set.tree, 1, Aim::Error(goal)).unwrap()
+}
+
 /// A frame that takes few samples to its error is not worth a pilot that one of many is.
 #[test]
 fn a_pilot_is_as_large_as_the_error_makes_the_frame() {
     let stage = floor_under_points(0.4);
     let set = stage.set();
-    let settings = RenderSettings { samples: 16_384, ..direct(48, 0) };
-    let camera = set.scene.cameras[0].clone();
-    let delegate = RenderDelegate::new(set.scene, &set.emitters, camera, settings);
-    let to = |error| pilot(&delegate, &set.tree, 1, Some(error)).unwrap();
-    assert_eq!(to(2.0), Knobs::default());
-    assert_ne!(to(0.005), Knobs::default());
-    // As of any frame with as many samples as are allowed.
-    assert_eq!(to(1e-6), pilot(&delegate, &set.tree, 1, None).unwrap());
+    assert_eq!(knobs_to(2.0, &set, 1.0), Knobs::default());
+    assert_ne!(knobs_to(0.005, &set, 1.0), Knobs::default());
+}
+
+/// The floor is in the unit of the picture, paths are in that of radiance.
+#[test]
+fn exposure_does_not_show_in_the_knobs() {
+    let stage = floor_under_points(0.4);
+    let set = stage.set();
+    let plain = knobs_to(0.005, &set, 1.0);
+    assert_ne!(plain, Knobs::default());
+    for scale in [1.0 / 1024.0, 1024.0] {
+        assert_eq!(knobs_to(0.005, &set, scale), plain);
+    }
 }

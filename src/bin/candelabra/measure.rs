@@ -16,7 +16,7 @@ use candelabra::pipeline::{
 };
 use candelabra::render::beauty::Beauty;
 use candelabra::render::frames::Frames;
-use candelabra::render::knob;
+use candelabra::render::knob::{self, Aim};
 use candelabra::render::noise::Grey;
 use candelabra::render::{
     LightStrategy, RenderDelegate, RenderError, RenderSettings, Split, SplitBy,
@@ -251,7 +251,7 @@ fn measure(arguments: &Arguments, display: &Display) -> Result<Measured> {
     }
     // What a render of this shot would find for itself.
     display.tell(Event::Stage { name: "choosing the knob of splitting".into() });
-    let knobs = knob::pilot(&delegate, &shot.tree, shot.frame, None)?;
+    let knobs = knob::pilot(&delegate, &shot.tree, shot.frame, Aim::Even)?;
     let base = RenderSettings { split: Split::ByBounce(knobs), ..base };
     report.settings = base.clone();
     let entrants = entrants(arguments, report.lights);

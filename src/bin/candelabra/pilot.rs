@@ -7,7 +7,7 @@ use anyhow::{Context, Result};
 use candelabra::measure::{FrameCost, Onlooker, ShotCost, Subject};
 use candelabra::page::{Lines, Short, counted};
 use candelabra::pipeline::{self, Effort, Event, ShotTrees, Watch};
-use candelabra::render::knob;
+use candelabra::render::knob::{self, Aim};
 use candelabra::render::noise::{Grey, decibels};
 use candelabra::render::passes::ErrorGoal;
 use candelabra::render::{Progress, RenderDelegate, RenderError, RenderSettings};
@@ -67,12 +67,12 @@ pub fn run(arguments: &Arguments, display: &Display) -> Result<ShotCost> {
             Grey::of(luminances.into_iter())
         }
     };
+    let goal = ErrorGoal { error: arguments.error, grey, most: Effort::MOST };
     let base = pipeline::with_knobs(&mut delegate, &base, false, |delegate| {
-        let error = Some(arguments.error);
-        anyhow::Ok(knob::pilot(delegate, &trees.for_frame(own[0])?, own[0], error)?)
+        let aim = Aim::Error(goal);
+        anyhow::Ok(knob::pilot(delegate, &trees.for_frame(own[0])?, own[0], aim)?)
     })?;
     let mut shot = Shot { trees, delegate, base };
-    let goal = ErrorGoal { error: arguments.error, grey, most: Effort::MOST };
     let pilots = pilots(&frames, arguments.every);
     let mut costs: Vec<FrameCost> = Vec::new();
     for (number, &frame) in pilots.iter().enumerate() {

@@ -3,6 +3,7 @@
 use super::checkpoint::Checkpoint;
 use super::clock::{Clock, Deadline};
 use super::control::{FIRST_IN_TIME, FrameControl};
+use super::effort::Effort;
 use super::frame_noise::{FrameNoise, audit};
 use super::outputs::Outputs;
 use super::plan::{Plan, read_plan};
@@ -18,8 +19,9 @@ use crate::pipeline::{
     Watch, caveat, frames_of, frames_of_grey, glimpse, view_keys, with_knobs,
 };
 use crate::render::beauty::Beauty;
-use crate::render::knob::pilot;
+use crate::render::knob::{Aim, pilot};
 use crate::render::noise::Grey;
+use crate::render::passes::ErrorGoal;
 use crate::render::{self, RenderDelegate, RenderSettings, Split};
 use std::collections::BTreeMap;
 use std::time::Duration;
@@ -293,16 +295,28 @@ impl<'a> Pass<'a> {
         if let Some(settings) = &self.settings {
             return Ok(settings.clone());
         }
+        let aim = self.aim()?;
         let Pass { job, delegate, shot, emitters, trees, learned, watch, clock, .. } = self;
         let delegate = prepared(delegate, shot, (emitters, *learned), *watch, clock);
         let frame = frames_of(&shot.scene)[0];
         let found = with_knobs(delegate, &shot.settings, job.effort.time_decides(), |delegate| {
             of_any_frame(shot, emitters, trees, frame, |tree| {
-                Ok(pilot(delegate, tree, frame, job.effort.error)?)
+                Ok(pilot(delegate, tree, frame, aim)?)
             })
         })?;
         clock.lap(|seconds| &mut seconds.ahead);
         Ok(self.settings.insert(found).clone())
+    }
+
+    /// What decides how many samples a pixel gets.
+    fn aim(&mut self) -> Result<Aim, Trouble> {
+        let Effort { error, samples: most, .. } = self.job.effort;
+        let grey = self.grey()?.filter(|_| self.job.effort.looks());
+        Ok(match (grey, error) {
+            (Some(grey), Some(error)) => Aim::Error(ErrorGoal { error, grey, most }),
+            (Some(grey), None) => Aim::Time(grey),
+            (None, _) => Aim::Even,
+        })
     }
 
     /// A small picture of a frame.

@@ -10,6 +10,7 @@
 //! | module | question |
 //! |---|---|
 //! | [`pilot()`] | which knobs are best for this shot? |
+//! | `sketch` | how noisy will the frame be, and where will its samples go? |
 //! | `trial` | what would other knobs do at a point of a path? |
 //! | `choice` | which of them are best together? |
 //! | `prices` | what does tracing cost, in a unit that no clock decides? |
@@ -17,9 +18,11 @@
 mod choice;
 mod pilot;
 mod prices;
+mod sketch;
 mod trial;
 
 pub use pilot::{pilot, pilot_pays};
+pub use sketch::Aim;
 pub(super) use trial::Trial;
 
 use serde::{Deserialize, Serialize};
