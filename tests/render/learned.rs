@@ -156,7 +156,10 @@ fn random_tables_leave_the_mean() {
         let settings = way.settings(true, &direct(16, 1024));
         let settings = RenderSettings { depth: 2, ..settings };
         let plain = Estimate::of_picture(&render(&set, &Table::default(), &settings));
-        let table = random_table(&set, planes.clone(), seed as u32);
+        let mut table = random_table(&set, planes.clone(), seed as u32);
+        // A weight of next to nothing makes samples so rare and so bright that no picture tells its own error. What such
+        // weights do is told without noise, in `light_tree/veils.rs`.
+        table.rows.iter_mut().for_each(|row| row.weights = row.weights.map(|byte| byte.max(64)));
         let veiled =
             Estimate::of_picture(&render(&set, &table, &RenderSettings { seed: 1, ..settings }));
         let apart = plain.distance(&veiled);
