@@ -23,6 +23,7 @@ A tour, in the order of the work:
 `light_textures`    the pictures of rect lights and domes
 `pictures`, `baking`, `asset_files`     picture files into arrays, light of any range into a PNG
 `mesh`, `polygons`, `normals`, `triangulate`, `primvars`, `gprims`     geometry
+`curves`, `tubes`   where BasisCurves run, and surfaces around them
 `skinning`          poses of skeletons and blend shapes
 `deformation`       morph targets of what changes its shape
 `velocities`        points and instances that move by their velocities

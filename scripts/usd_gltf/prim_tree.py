@@ -16,7 +16,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from pxr import Gf, Usd, UsdGeom, UsdLux, UsdShade
 
-from . import gprims
+from . import curves, gprims
 from .arnold_placement import placement
 from .cameras import read_camera
 from .fog import is_fog, read_fog
@@ -218,7 +218,7 @@ class PrimTree:
         geometry_light = self._geometry_lights.get(str(path))
         if kind == "Volume":
             compiled.fog = read_fog(prim, self.frames, self.report.about("other"))
-        if prim.IsA(UsdGeom.Mesh) or kind in gprims.TYPES:
+        if prim.IsA(UsdGeom.Mesh) or kind in gprims.TYPES or kind == curves.TYPE:
             light_prim = geometry_light or prim
             is_light = light_type(light_prim) is not None
             compiled.mesh = self.meshes.read(prim)
