@@ -13,7 +13,7 @@ A tour, in the order of the work:
 `light_inputs`      UsdLux's formulas: nits, lux, candela
 `light_visibility`, `light_losses`, `vendors`   which rays see a light; what is lost of it
 `light_networks`, `light_filters`   colours that shader networks compute; filters that multiply
-`arnold_placement`  where Arnold's own parameters put lights and cameras
+`arnold_placement`, `arnold_lens`   where Arnold's own parameters put lights and cameras, and how these see
 `vanishing`         visibility over time
 `light_shapes`      tessellation and world-space areas of the intrinsic lights
 `light_carriers`    which glTF object carries which light
