@@ -268,15 +268,23 @@ class PrimTree:
         """The prototypes of a PointInstancer, which is `seen` so, and where they are put."""
         path = str(prim.GetPath())
         targets = UsdGeom.PointInstancer(prim).GetPrototypesRel().GetForwardedTargets()
-        for number, placements in read_placements(prim, self.frames, self.report).items():
+        for number, groups in read_placements(prim, self.frames, self.report).items():
             if number < 0 or number >= len(targets):
                 why = f"protoIndices name {number}, but there are {len(targets)} prototypes; they are left out"
                 self.report.warn(path, "instances without a prototype", why)
                 continue
             prototype = self._prototype(str(targets[number]), path, seen)
-            if prototype is not None:
-                compiled.instances.append((prototype, placements))
-                self.report.count("instances", len(placements.numbers))
+            if prototype is None:
+                continue
+            drawn = is_drawn(self.stage.GetPrimAtPath(targets[number]))
+            for placements in groups:
+                own, at = prototype, placements.seen
+                if at is not None and (prototype.lit or _resets(prototype)):
+                    masks = (at if mask is None else mask & at for mask in (seen.at, seen.drawn))
+                    own = self._prototype(str(targets[number]), path, Seen(*masks, seen.is_left_out))
+                if own is not None:
+                    compiled.instances.append((own, placements if drawn else replace(placements, seen=None)))
+                    self.report.count("instances", len(placements.numbers))
 
     def _prototype(self, target: str, instancer: str, seen: Seen) -> Prim | None:
         """A prototype compiled once for all instancers that are `seen` alike. What hides them hides it, not what
@@ -295,6 +303,11 @@ class PrimTree:
             self._prototypes[key] = self._compile(prim, None, PROTOTYPE_PREDICATE, seen)
             self._open.discard(target)
         return self._prototypes[key]
+
+
+def _resets(prim: Prim) -> bool:
+    """Whether something below a prim is not moved with it."""
+    return any(child.resets or _resets(child) for child in prim.children)
 
 
 def _over_time(xformable: UsdGeom.Xformable, frames: Frames) -> np.ndarray:
