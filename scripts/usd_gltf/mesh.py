@@ -364,8 +364,8 @@ class MeshReader:
             return self._display_color(mesh, corners)
         color = self._primvar(mesh, look.color_primvar, 3)
         if color is None:
-            why = f"{look.path} reads primvars:{look.color_primvar}; its default is used"
-            self.report.about("materials").warn(mesh.prim.GetPath(), "mesh without the colours of its material", why)
+            why = f"{look.path} reads primvars:{look.color_primvar}; the default that the material gives is used"
+            self.report.about("materials").note(mesh.prim.GetPath(), "mesh without the colours of its material", why)
             color = CornerValues(np.array([look.color_default or (0.0,) * 3]), np.zeros(len(corners), int), True)
         rgb = np.clip(color.values * look.color_scale, 0.0, 1.0)
         return replace(color, values=np.hstack([rgb, np.full((len(rgb), 1), look.base_color[3])]))
