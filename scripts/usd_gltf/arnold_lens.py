@@ -44,6 +44,9 @@ class ArnoldLens:
                 attribute = prim.GetAttribute(alias)
                 if _is_authored(attribute) and len(_rows(attribute.Get(Usd.TimeCode.EarliestTime()), name)):
                     self._found.setdefault(name, attribute)
+        if not orthographic and all(self._is_whole(name) for name in _WINDOW):
+            for name in _WINDOW:
+                self._found.pop(name, None)
         if self._found:
             why = "they say how the camera sees, for it has no such attributes of its own"
             report.note(prim.GetPath(), f"Arnold's {', '.join(self._found)}", why)
@@ -55,6 +58,14 @@ class ArnoldLens:
 
     def __contains__(self, name: str) -> bool:
         return name in self._found
+
+    def _is_whole(self, name: str) -> bool:
+        """Whether one end of a window is never other than where the field of view ends."""
+        attribute, end = self._found.get(name), {"screen_window_min": -1.0, "screen_window_max": 1.0}[name]
+        if attribute is None:
+            return True
+        codes = attribute.GetTimeSamples() or [Usd.TimeCode.Default()]
+        return all((_rows(attribute.Get(code), name) == end).all() for code in codes)
 
     def get(self, name: str, code: float, fallback: tuple[float, ...]) -> np.ndarray:
         """A parameter's numbers at a time code; of several motion keys the first."""

@@ -43,7 +43,7 @@ def read_placements(prim: Usd.Prim, frames: Frames, report: Notebook) -> dict[in
     for code in codes:
         matrices, prototypes, shown, ids = _state(instancer, code)
         if len(matrices) != len(prototypes):
-            why = "positions, orientations, scales and protoIndices have different lengths"
+            why = f"{_lengths(instancer, code)} do not fit each other"
             later = f" at frame {code:g}; nothing of it is seen then" if code != frames.first else ""
             report.warn(prim.GetPath(), "PointInstancer without usable instances", why + later)
             matrices, prototypes, shown, ids = (part[:0] for part in (matrices, prototypes, shown, ids))
@@ -132,6 +132,15 @@ def _state(instancer: UsdGeom.PointInstancer, code: float) -> tuple[np.ndarray, 
     if len(ids) != len(prototypes) or len(np.unique(ids)) != len(ids):
         ids = np.arange(len(prototypes))
     return stack, prototypes, shown, ids
+
+
+def _lengths(instancer: UsdGeom.PointInstancer, code: float) -> str:
+    """How many of all it has, for a message; what may be left out and is, is not named."""
+    turns = instancer.GetOrientationsfAttr()
+    turns = turns if turns.HasAuthoredValue() else instancer.GetOrientationsAttr()
+    others = (attribute for attribute in (turns, instancer.GetScalesAttr()) if attribute.HasAuthoredValue())
+    counts = [f"{len(attribute.Get(code) or ())} {attribute.GetName()}" for attribute in (instancer.GetPositionsAttr(), *others)]
+    return f"{', '.join(counts)} and {len(instancer.GetProtoIndicesAttr().Get(code) or ())} protoIndices"
 
 
 def _without_velocities(instancer: UsdGeom.PointInstancer, time: Usd.TimeCode) -> list[Gf.Matrix4d]:

@@ -200,6 +200,12 @@ def test_arnolds_focus_and_planes_count_where_usd_says_nothing_over_time_too(exp
     assert extras["values"]["focusDistance_m"] == pytest.approx(np.arange(2, 8) * unit)
 
 
+def test_a_window_that_is_all_of_the_field_of_view_says_nothing(export):
+    lines = "float2[] primvars:arnold:screen_window_min = [(-1, -1)]\n float2[] primvars:arnold:screen_window_max"
+    assert "Arnold's" not in export(f'def Camera "C" {{ {lines} = [(1, 1)] }}', "--strict").said()
+    assert "Arnold's" in export(f'def Camera "C" {{ {lines}.timeSamples = {{ 1: [(1, 1)], 2: [(2, 2)] }} }}', "--strict").said()
+
+
 def test_a_window_that_is_empty_leaves_its_camera_out(export):
     result = export('def Camera "C" { float2[] primvars:arnold:screen_window_max = [(-1, 1)] }')
     assert result.warned("cameras") == {"camera without a field of view"} and "screen_window" in result.said()
