@@ -2,13 +2,13 @@
 
 import numpy as np
 import pytest
-from conftest import HEADER, Gltf
+from conftest import HEADER
 from PIL import Image
 from pxr import Usd, UsdGeom
 from test_deformation import SHOT, array, corners_of, sampled, seconds
 from test_skinning import SKELETON, animation, baked
 from usd_gltf.curves import Layout, Samples
-from usd_gltf.tubes import PIECES, SIDES
+from usd_gltf.tubes import SIDES
 
 BASES = ("linear", "bezier", "bspline", "catmullRom")
 WRAPS = ("nonperiodic", "periodic", "pinned")
@@ -397,65 +397,34 @@ def test_skinned_curves_follow_their_joints(gltf):
             assert np.linalg.norm(triangles - point, axis=1).min() < 0.03
 
 
-@pytest.mark.parametrize(("change", "what"), [
-    (("[4]", "[3]"), "curves with a broken topology"),
-    (("[4]", "[5, -1]"), "curves with a broken topology"),
-    (("[4]", "[]"), "curves without vertices"),
-    (("[4]", "[1, 1, 2, 0]"), "curves of too few vertices"),
-    (('"bspline"', '"hermite"'), "curves of an unknown kind"),
-    (('"nonperiodic"', '"looped"'), "curves of an unknown kind"),
-])  # fmt: skip
-def test_what_makes_no_curves_is_left_out(export, change, what):
-    result = export(curves([(0, 0, k) for k in range(4)], basis="bspline").replace(*change))
-    assert result.code == 0, result.err
-    assert result.warned() == {what}
-    assert "/C" not in Gltf(result.path).by_path
+@pytest.mark.parametrize("size", [1e-9, 1e-4, 1.0, 1e5, 1e12])
+@pytest.mark.parametrize("ratio", [1e-5, 1e-2, 1.0, 30.0])
+def test_neither_the_size_of_curves_nor_how_thin_they_are_matters(gltf, size, ratio):
+    rng = np.random.default_rng(3)
+    points = np.cumsum(rng.normal(size=(9, 3)), axis=0)
+    areas = []
+    for scale in (1.0, size):
+        scene = gltf(curves(points * scale, basis="bspline", width=ratio * scale), out=f"{scale:g}.glb")
+        corners = outline(scene)[0] / scale
+        index = scene.accessor(scene.primitives("/C")[0]["indices"]).reshape(-1, 3)
+        a, b, c = (corners[index[:, k]] for k in range(3))
+        areas.append(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / 2)
+    assert areas[1] == pytest.approx(areas[0], rel=2e-3)
 
 
-def test_vertices_beyond_the_last_span_are_left_out(export):
-    result = export(curves([(0, 0, k) for k in range(9)], [6, 3], "bezier"))
-    assert result.warned() == {"curves with vertices left over"}
-    assert "5 vertices" in result.said()
-    assert outline(Gltf(result.path))[0][:, 2].max() == pytest.approx(3)
-
-
-def test_points_that_are_no_numbers_take_their_curve_along(export):
-    result = export(curves([(0, 0, 0), (0, 0, 1), (1, 0, 0), (float("nan"), 0, 1)], [2, 2]))
-    assert result.warned() == {"points that are not finite"}
-    points, _ = outline(Gltf(result.path))
-    assert points[:, 0].max() < 0.2
-
-
-@pytest.mark.parametrize(("widths", "what", "radius"), [
-    ("", "curves without widths", 0.5),
-    ('float[] widths = [0.5, 0.5, 0.5, 0.5, 0.5] (interpolation = "vertex")', "widths do not fit their curves", 0.5),
-    ('float[] widths = [0.3] (interpolation = "vertex")', None, 0.15),
-    ("float[] widths = [0.3, 0.3, 0.3]", None, 0.15),
-    ('float[] widths = [9] (interpolation = "constant")\nfloat[] primvars:widths = [0.3] (interpolation = "constant")', None, 0.15),
-])  # fmt: skip
-def test_widths_that_are_missing_or_of_another_size(export, widths, what, radius):
-    result = export(curves([(0, 0, k) for k in range(3)], width=widths))
-    assert result.warned() == ({what} if what else set())
-    points, _ = outline(Gltf(result.path))
-    sides = SIDES[2]
-    assert np.linalg.norm(points[:, :2], axis=1).max() == pytest.approx(radius * np.pi / sides / np.sin(np.pi / sides))
-
-
-def test_curves_that_glow_are_lights_of_their_area(gltf):
-    look = """def Material "Neon" { token outputs:surface.connect = </Neon/S.outputs:surface>
-        def Shader "S" { uniform token info:id = "UsdPreviewSurface"
-            color3f inputs:emissiveColor = (3, 2, 1)
-            token outputs:surface } }
-    """
-    scene = gltf(curves([(0, 0, 0), (0, 0, 1)], more="rel material:binding = </Neon>") + "\n" + look)
-    assert scene.nits("/C") == pytest.approx([3, 2, 1])
-
-
-def test_many_curves_are_refined_less(export, monkeypatch):
-    monkeypatch.setattr("usd_gltf.tubes.MOST_FACES", 200)
-    rows = [(x, 0, k) for x in range(10) for k in range(4)]
-    result = export(curves(rows, [4] * 10, "bezier"))
-    assert result.warned() == {"curves that are refined less"}
-    assert "level 2 has 320 faces" in result.said() and "level 1 is used" in result.said()
-    assert result.report["counts"]["curves"] == 10
-    assert PIECES[1] * SIDES[1] * 10 <= 200
+@pytest.mark.parametrize("basis", BASES)
+@pytest.mark.parametrize("wrap", WRAPS)
+def test_a_curve_among_others_is_what_it_is_alone(gltf, basis, wrap):
+    """Curves of all lengths in one prim, with curves between them that have no span."""
+    rng = np.random.default_rng(11)
+    counts = [12, 1, 6, 9, 0, 6] if wrap == "periodic" else [10, 1, 4, 13, 0, 7]
+    points = np.cumsum(rng.normal(size=(sum(counts), 3)), axis=0)
+    starts = np.cumsum(counts) - counts
+    together = gltf(curves(points, counts, basis, wrap))
+    alone = []
+    for start, count in zip(starts, counts, strict=True):
+        if count > 1:
+            alone += corners_of(gltf(curves(points[start : start + count], None, basis, wrap), out="alone.glb").triangles("/C"))
+    found = corners_of(together.triangles("/C"))
+    assert len(found) == len(alone)
+    assert np.sort(np.array(found).reshape(-1, 9), axis=0) == pytest.approx(np.sort(np.array(alone).reshape(-1, 9), axis=0), abs=2e-4)
