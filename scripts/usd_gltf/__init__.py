@@ -13,7 +13,7 @@ A tour, in the order of the work:
 `light_inputs`      UsdLux's formulas: nits, lux, candela
 `light_visibility`, `light_losses`, `vendors`   which rays see a light; what is lost of it
 `light_networks`, `light_filters`   colours that shader networks compute; filters that multiply
-`arnold_placement`  where Arnold's own parameters put lights and cameras
+`arnold_placement`, `arnold_lens`   where Arnold's own parameters put lights and cameras, and how these see
 `vanishing`         visibility over time
 `light_shapes`      tessellation and world-space areas of the intrinsic lights
 `light_carriers`    which glTF object carries which light
@@ -23,6 +23,7 @@ A tour, in the order of the work:
 `light_textures`    the pictures of rect lights and domes
 `pictures`, `baking`, `asset_files`     picture files into arrays, light of any range into a PNG
 `mesh`, `polygons`, `normals`, `triangulate`, `primvars`, `gprims`     geometry
+`curves`, `tubes`   where BasisCurves run, and surfaces around them
 `skinning`          poses of skeletons and blend shapes
 `deformation`       morph targets of what changes its shape
 `velocities`        points and instances that move by their velocities

@@ -12,6 +12,7 @@ import numpy as np
 from pxr import Usd, UsdGeom
 
 from .animation import NOISE, needed
+from .arnold_lens import ArnoldLens
 from .arnold_placement import placement_names
 from .gltf_document import number, numbers
 from .report import Notebook
@@ -55,7 +56,7 @@ def read_camera(
         report.warn(path, "camera shutter is no interval", why)
     if is_hidden:
         extras["hidden"] = True
-    _report_losses(camera, frames, report)
+    _report_losses(camera, frames, lens.arnold, report)
     report.count("cameras")
     znear, zfar = lens.clip_m()
     if orthographic:
@@ -83,7 +84,9 @@ class _Lens:
         self.path, self.frames, self.report = prim.GetPath(), frames, report
         self.unit = meters_per_unit
         attributes = filter(prim.GetAttribute, _LENS)
+        self.arnold = ArnoldLens(prim, orthographic, report)
         self.varies = any(changes(prim.GetAttribute(name), frames) for name in attributes)
+        self.varies |= any(changes(attribute, frames) for attribute in self.arnold.attributes)
         self.codes = frames.codes if self.varies else (frames.first,)
         self.rest = self.codes.index(frames.first)
         self.aspect: float | None = None
@@ -169,26 +172,36 @@ class _Lens:
             why = f"at time code {self._later(good)} its apertures and focal length are not positive; those before are held"
             self.report.warn(self.path, what, why)
             width, height, focal = (self._held(column, good) for column in (width, height, focal))
+        focal_there = np.ones_like(focal) if orthographic else focal
+        film = [self.arnold.film(code, *sizes) for code, *sizes in zip(self.codes, width, height, focal_there, strict=True)]
+        width, height, *middle = np.array(film).T
+        if not (good := (np.stack([width, height]) > 0).all(axis=0)).all():
+            self.report.warn(self.path, what, f"at time code {self._later(good)} Arnold's screen_window is empty; it is left out")
+            return
         aspects = width / height
         self.aspect = float(aspects[self.rest])
         if not np.allclose(aspects, self.aspect, rtol=1e-5):
-            why = f"it is {aspects.min():.4g} to {aspects.max():.4g} wide for its height; the picture keeps the shape of the first " \
-                "frame, and sees the width of each"  # fmt: skip
-            self.report.warn(self.path, "animated camera aspect", why)
-        # The picture is as wide as the aperture, as usdrecord's is: that one changes its height with the shape.
-        height = np.where(np.isclose(aspects, self.aspect, rtol=1e-6), height, width / self.aspect)
+            why = f"it is {aspects.min():.4g} to {aspects.max():.4g} wide for its height; the picture keeps the shape of the first frame, " \
+                "and all of each is in it, with more beside it (RenderSettings' expandAperture); usdrecord's changes its height"  # fmt: skip
+            self.report.note(self.path, "animated camera aspect", why)
+        same = np.isclose(aspects, self.aspect, rtol=1e-6)
+        wider, higher = np.maximum(width, height * self.aspect), np.maximum(height, width / self.aspect)
+        width, height = np.where(same, width, wider), np.where(same, height, higher)
         if orthographic:
             self.columns["ymag"] = height * (_TENTH * self.unit / 2)
         else:
             self.columns["yfov"] = 2 * np.arctan(height / (2 * focal))
         self.columns["focalLength_m"] = _finite(focal * _TENTH * self.unit)
         offsets = camera.GetHorizontalApertureOffsetAttr(), camera.GetVerticalApertureOffsetAttr()
-        offsets = [_finite(self._values(attribute) / size) for attribute, size in zip(offsets, (width, height))]
+        offsets = [_finite(self._values(attribute) + by) for attribute, by in zip(offsets, middle, strict=True)]
+        offsets = [by / size for by, size in zip(offsets, (width, height), strict=True)]
         self.columns["filmOffset"] = np.stack(offsets, axis=1)
 
     def _focus(self, camera: UsdGeom.Camera) -> None:
         self.columns["fStop"] = np.maximum(_finite(self._values(camera.GetFStopAttr())), 0.0)
         distance = self._values(camera.GetFocusDistanceAttr()) * self.unit
+        if "focus_distance" in self.arnold:
+            distance = np.array([self.arnold.get("focus_distance", code, (1.0,))[0] for code in self.codes]) * self.unit
         self.columns["focusDistance_m"] = np.maximum(_finite(distance), 0.0)
         if not self.columns["fStop"].any():
             # A pinhole is focused nowhere and everywhere.
@@ -200,6 +213,9 @@ class _Lens:
         ranges = self._values(camera.GetClippingRangeAttr()).reshape(len(self.codes), -1)
         if ranges.shape[1] != 2:
             ranges = np.tile(_DEFAULT_RANGE, (len(self.codes), 1))
+        for end, name in enumerate(("near_clip", "far_clip")):
+            if name in self.arnold:
+                ranges[:, end] = [self.arnold.get(name, code, (_DEFAULT_RANGE[end],))[0] for code in self.codes]
         good = np.isfinite(ranges[:, 0]) & (ranges[:, 0] < ranges[:, 1])
         what = "clippingRange is no range"
         if not good.any():
@@ -246,7 +262,7 @@ def _finite(values: np.ndarray) -> np.ndarray:
     return np.where(np.isfinite(values), values, 0.0)
 
 
-def _report_losses(camera: UsdGeom.Camera, frames: Frames, report: Notebook) -> None:
+def _report_losses(camera: UsdGeom.Camera, frames: Frames, arnold: ArnoldLens, report: Notebook) -> None:
     """What a camera has and the file cannot hold."""
     prim, path = camera.GetPrim(), camera.GetPath()
     planes = camera.GetClippingPlanesAttr().Get(frames.first)
@@ -254,7 +270,8 @@ def _report_losses(camera: UsdGeom.Camera, frames: Frames, report: Notebook) -> 
         report.warn(path, "clippingPlanes", f"{len(planes)} planes have no carrier; nothing is cut by them")
     if camera.GetStereoRoleAttr().Get(frames.first) not in (None, UsdGeom.Tokens.mono):
         report.note(path, "camera stereoRole", "each camera is carried by itself")
-    report_others(prim, placement_names(prim), frames.first, report, _in_arnolds_words(camera, frames.first))
+    known = placement_names(prim) | {attribute.GetName() for attribute in arnold.attributes}
+    report_others(prim, known, frames.first, report, _in_arnolds_words(camera, frames.first))
 
 
 def _in_arnolds_words(camera: UsdGeom.Camera, code: float) -> dict[str, float]:

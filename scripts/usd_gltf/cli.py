@@ -71,7 +71,7 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--normalize-area", choices=("stage", "metre"), default="stage",
                         help="unit of the area that `normalize` divides by (default: stage)")  # fmt: skip
     parser.add_argument("--complexity", choices=tuple(LEVELS), default="high",
-                        help="how far subdivision surfaces are refined, as in usdrecord: 0, 1, 2 or 3 times "
+                        help="how far subdivision surfaces and curves are refined, as in usdrecord: 0, 1, 2 or 3 times "
                         "(default: high)")  # fmt: skip
     # `--strict` alone stands for all categories (`main` spells it out), so that it never takes the
     # word after it for its list.

@@ -27,7 +27,7 @@ def report_composition(stage: Usd.Stage, problems: dict[str, str], report: Noteb
         path = error.rootSite.path
         named = re.match(r"Could not (?:open asset|load sublayer) @(.*?)@", text)
         if named is None:
-            report.warn(path, "composition error", text)
+            report.warn(path, *_unresolved(text))
             continue
         file = named[1].split(":SDF_FORMAT_ARGS:")[0]
         kind = "payload" if f"@{file}@ for payload" in text else "layer"
@@ -51,6 +51,20 @@ def report_composition(stage: Usd.Stage, problems: dict[str, str], report: Noteb
         else:
             why = reason.removesuffix("; skipping.").strip(" .") or "USD cannot open it"
             lines.warn(path, f"unreadable {kind}", f"{file} is there, but cannot be read: {why}")
+
+
+def _unresolved(text: str) -> tuple[str, str]:
+    """What is wrong where no file is, and why: a prim that is referred to and not there, or else USD's own text."""
+    found = re.fullmatch(r"Unresolved (\w+) prim path @(.*?)@<(.*?)> introduced by @(.*?)@<(.*?)>.*", text)
+    if found is None:
+        return "composition error", text
+    kind, file, prim, layer, at = found.groups()
+    where = "" if layer == file else f" of {PurePath(layer).name}"
+    if prim == "defaultPrim":
+        lack = f"{file} has no defaultPrim, and the {kind} at {at}{where} names none; name a prim, or set the defaultPrim"
+    else:
+        lack = f"{file} has no prim {prim}, which the {kind} at {at}{where} names"
+    return f"missing prim of a {kind}", f"{lack}; what it should hold is left out"
 
 
 def _is_there(file: str) -> bool:

@@ -1,7 +1,13 @@
-"""PointInstancers: where their instances stand, and which prototype each one is."""
+"""PointInstancers: where their instances stand, and which prototype each one is, over time.
+
+An instance is who it is by its id, or by its place in the arrays where there are no ids (usdGeom/schema.usda). One that
+appears, vanishes or is masked for a while is seen at some of the sampled times; one that changes its prototype is as many as it
+has prototypes, each seen in its time.
+"""
 
 from __future__ import annotations
 
+from collections import Counter
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,44 +19,91 @@ from .stage import Frames
 from .transforms import column
 from .velocities import has_seconds, instances_move
 
+Key = tuple[int, int]
+"""The id of an instance, and its prototype."""
+
 
 @dataclass
 class Placements:
-    """The visible instances of one prototype: their numbers and their matrices."""
+    """Instances of one prototype that are seen at the same times: their numbers and their matrices."""
 
-    numbers: np.ndarray
+    numbers: list[str]
     matrices: np.ndarray
     """(n, 4, 4), or (times, n, 4, 4) if the instancer moves; without the prototype's own matrix."""
+    seen: np.ndarray | None = None
+    """(times,) when they are there; None if always."""
 
 
-def read_placements(prim: Usd.Prim, frames: Frames, report: Notebook) -> dict[int, Placements]:
+def read_placements(prim: Usd.Prim, frames: Frames, report: Notebook) -> dict[int, list[Placements]]:
     """Placements of each prototype, by its index in `prototypes`."""
     instancer = UsdGeom.PointInstancer(prim)
-    path = prim.GetPath()
-    matrices, prototypes, shown = _state(instancer, frames.first)
-    if len(prototypes) == 0:
-        return {}
-    if len(matrices) != len(prototypes):
-        why = "positions, orientations, scales and protoIndices have different lengths"
-        report.warn(path, "PointInstancer without usable instances", why)
-        return {}
     moves = _moves(instancer) or instances_move(instancer, frames, report.about("animation"))
-    states = [_state(instancer, code) for code in frames.codes] if moves else []
-    if len(states) > 1:
-        if all(len(m) == len(matrices) and np.array_equal(p, prototypes) and np.array_equal(s, shown)
-               for m, p, s in states):  # fmt: skip
-            matrices = np.stack([m for m, _, _ in states])
-        else:
-            why = "instances that appear, vanish or change prototype have no carrier; the first frame is used"
-            report.about("animation").warn(path, "PointInstancer whose instances change", why)
-    if not np.isfinite(matrices).all():
+    codes = frames.codes if moves else (frames.first,)
+    states = []
+    for code in codes:
+        matrices, prototypes, shown, ids = _state(instancer, code)
+        if len(matrices) != len(prototypes):
+            why = f"{_lengths(instancer, code)} do not fit each other"
+            later = f" at frame {code:g}; nothing of it is seen then" if code != frames.first else ""
+            report.warn(prim.GetPath(), "PointInstancer without usable instances", why + later)
+            matrices, prototypes, shown, ids = (part[:0] for part in (matrices, prototypes, shown, ids))
         good = np.isfinite(matrices).all(axis=(-1, -2))
-        shown = shown & (good.all(axis=0) if good.ndim == 2 else good)
-        report.warn(path, "instances at non-finite places", "they are left out")
+        if not good.all():
+            report.warn(prim.GetPath(), "instances at non-finite places", "they are left out")
+        states.append(_State(matrices, prototypes, shown & good, ids))
+    if all(state.is_like(states[0]) for state in states):
+        return _steady(states)
+    return _changing(states)
+
+
+@dataclass
+class _State:
+    """All instances at one time: matrices (n, 4, 4), prototype indices, whether they are seen, ids."""
+
+    matrices: np.ndarray
+    prototypes: np.ndarray
+    shown: np.ndarray
+    ids: np.ndarray
+
+    def is_like(self, other: _State) -> bool:
+        """Whether the same instances are there."""
+        mine, theirs = (self.prototypes, self.shown, self.ids), (other.prototypes, other.shown, other.ids)
+        return all(np.array_equal(a, b) for a, b in zip(mine, theirs, strict=True))
+
+
+def _steady(states: list[_State]) -> dict[int, list[Placements]]:
+    """Placements of instances that are there at all times, or at none."""
+    first = states[0]
+    matrices = first.matrices if len(states) == 1 else np.stack([state.matrices for state in states])
     placed = {}
-    for prototype in np.unique(prototypes[shown]):
-        which = np.flatnonzero((prototypes == prototype) & shown)
-        placed[int(prototype)] = Placements(which, matrices[..., which, :, :])
+    for prototype in np.unique(first.prototypes[first.shown]):
+        which = np.flatnonzero((first.prototypes == prototype) & first.shown)
+        placed[int(prototype)] = [Placements([str(number) for number in which], matrices[..., which, :, :])]
+    return placed
+
+
+def _changing(states: list[_State]) -> dict[int, list[Placements]]:
+    """Placements where instances come and go. While one is not there it stays where it was, or will be, for what is
+    between two times is linear."""
+    times, found = len(states), {}
+    for time, state in enumerate(states):
+        for number in np.flatnonzero(state.shown).tolist():
+            key = (int(state.ids[number]), int(state.prototypes[number]))
+            seen, matrices = found.setdefault(key, (np.zeros(times, bool), np.empty((times, 4, 4))))
+            seen[time], matrices[time] = True, state.matrices[number]
+    groups: dict[tuple[int, bytes], list[Key]] = {}
+    for key in sorted(found):
+        groups.setdefault((key[1], found[key][0].tobytes()), []).append(key)
+    prototypes_of = Counter(identity for identity, _ in found)
+    placed: dict[int, list[Placements]] = {}
+    for (prototype, _), keys in groups.items():
+        seen = found[keys[0]][0]
+        there = np.flatnonzero(seen)
+        last = np.maximum.accumulate(np.where(seen, np.arange(times), -1))
+        held = np.where(last < 0, there[0], last)
+        matrices = np.stack([found[key][1][held] for key in keys], axis=1)
+        numbers = [f"{identity} of prototype {prototype}" if prototypes_of[identity] > 1 else str(identity) for identity, _ in keys]
+        placed.setdefault(prototype, []).append(Placements(numbers, matrices, None if seen.all() else seen))
     return placed
 
 
@@ -58,13 +111,13 @@ def _moves(instancer: UsdGeom.PointInstancer) -> bool:
     attributes = (
         instancer.GetPositionsAttr(), instancer.GetOrientationsAttr(), instancer.GetOrientationsfAttr(),
         instancer.GetScalesAttr(), instancer.GetProtoIndicesAttr(), instancer.GetInvisibleIdsAttr(),
-        instancer.GetVelocitiesAttr(), instancer.GetAngularVelocitiesAttr(),
+        instancer.GetVelocitiesAttr(), instancer.GetAngularVelocitiesAttr(), instancer.GetIdsAttr(),
     )  # fmt: skip
     return any(attribute.ValueMightBeTimeVarying() for attribute in attributes)
 
 
-def _state(instancer: UsdGeom.PointInstancer, code: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Matrices, prototype indices and visibility of all instances at a time code."""
+def _state(instancer: UsdGeom.PointInstancer, code: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Matrices, prototype indices, visibility and ids of all instances at a time code. Ids that are not one for each instance are none."""
     time = Usd.TimeCode(code)
     kind = UsdGeom.PointInstancer
     if has_seconds(instancer.GetPrim().GetStage()):
@@ -75,7 +128,19 @@ def _state(instancer: UsdGeom.PointInstancer, code: float) -> tuple[np.ndarray, 
     mask = instancer.ComputeMaskAtTime(time)
     shown = np.array(mask, dtype=bool) if len(mask) == len(prototypes) else np.ones(len(prototypes), bool)
     stack = column(np.array(matrices, dtype=float).reshape(-1, 4, 4))
-    return stack, prototypes, shown
+    ids = as_rows(instancer.GetIdsAttr().Get(time), 1, int)
+    if len(ids) != len(prototypes) or len(np.unique(ids)) != len(ids):
+        ids = np.arange(len(prototypes))
+    return stack, prototypes, shown, ids
+
+
+def _lengths(instancer: UsdGeom.PointInstancer, code: float) -> str:
+    """How many of all it has, for a message; what may be left out and is, is not named."""
+    turns = instancer.GetOrientationsfAttr()
+    turns = turns if turns.HasAuthoredValue() else instancer.GetOrientationsAttr()
+    others = (attribute for attribute in (turns, instancer.GetScalesAttr()) if attribute.HasAuthoredValue())
+    counts = [f"{len(attribute.Get(code) or ())} {attribute.GetName()}" for attribute in (instancer.GetPositionsAttr(), *others)]
+    return f"{', '.join(counts)} and {len(instancer.GetProtoIndicesAttr().Get(code) or ())} protoIndices"
 
 
 def _without_velocities(instancer: UsdGeom.PointInstancer, time: Usd.TimeCode) -> list[Gf.Matrix4d]:

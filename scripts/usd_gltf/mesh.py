@@ -1,4 +1,4 @@
-"""UsdGeomMesh and the intrinsic gprims to glTF primitives.
+"""UsdGeomMesh, the intrinsic gprims and UsdGeomBasisCurves to glTF primitives.
 
 A mesh is cut into pieces, one for each material (GeomSubset). Corners with equal position, normal,
 texture coordinates and colour share a vertex. Texture coordinates are turned over: USD's v runs up
@@ -33,6 +33,7 @@ from .skinning import Skinning
 from .stage import Frames
 from .subdivision import Subdivider, Surface
 from .triangulate import triangulate
+from .tubes import Strander, Strands
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -65,14 +66,20 @@ class Piece:
 
 @dataclass
 class Authored:
-    """A mesh as it is authored, which its primvars are read against, and the surface that is made of it."""
+    """A mesh, or curves, as authored, which its primvars are read against, and the surface that is made of it."""
 
     prim: Usd.Prim
     counts: np.ndarray
     corners: np.ndarray
-    surface: Surface | None = None
+    surface: Surface | Strands | None = None
+    varying: int | None = None
+    """How many `varying` values curves have."""
     carried: dict[tuple[str, int], CornerValues] = field(default_factory=dict)
     """Primvars that are on the surface already: the pieces of a mesh share them."""
+
+    def shape(self, points: np.ndarray, code: float) -> tuple[np.ndarray, CornerValues | None]:
+        """Points and normals of the surface, of the mesh's points at a time."""
+        return self.surface.shape(points, code) if isinstance(self.surface, Strands) else self.surface.shape(points)
 
 
 @dataclass
@@ -161,12 +168,13 @@ class MeshReader:
         self.polygons = PolygonReader(skinning, frames, report)
         self.deformer = Deformer(document, frames, report)
         self.subdivider = Subdivider(complexity, frames, report)
+        self.strander = Strander(complexity, report)
         self._read: dict[tuple, MeshSource | None] = {}
         self.link_subsets: LinkSubsets | None = None
         """Subsets that light links divide meshes by, besides materials."""
 
     def read(self, prim: Usd.Prim) -> MeshSource | None:
-        """The mesh of a Mesh or an intrinsic gprim; None (reported) if it has no faces."""
+        """The mesh of a Mesh, an intrinsic gprim or curves; None (reported) if it has no faces."""
         subsets = _material_subsets(prim)
         if self.link_subsets is not None:
             subsets += self.link_subsets.of(prim, subsets)
@@ -199,7 +207,10 @@ class MeshReader:
         if not np.isfinite(points).all():
             self.report.warn(prim.GetPath(), "points that are not finite", "faces that use them are left out")
         authored, surface = Authored(prim, counts, corners), None
-        if prim.GetTypeName() not in gprims.TYPES:
+        if polygons.layout is not None:
+            authored.varying = int(polygons.layout.varying.sum())
+            surface = authored.surface = self.strander.surface(prim, polygons.layout, points, polygons.deforms, self.code)
+        elif prim.GetTypeName() not in gprims.TYPES:
             surface = authored.surface = self.subdivider.surface(prim, points, counts, corners, polygons.deforms)
         owner = np.zeros(len(counts), int)
         if surface is not None:
@@ -220,7 +231,7 @@ class MeshReader:
             self.report.warn(prim.GetPath(), "mesh without faces", "it is left out")
             return None
         points = np.where(np.isfinite(points), points, 0.0)
-        if prim.GetAttribute("orientation").Get() == UsdGeom.Tokens.leftHanded:
+        if polygons.layout is None and prim.GetAttribute("orientation").Get() == UsdGeom.Tokens.leftHanded:
             triangles = triangles[:, ::-1]
         smooth = normals is None and surface is None and self._is_cage(prim)
         normals = _finished(normals, smooth, points, corners, triangles)
@@ -255,7 +266,7 @@ class MeshReader:
         points, normals = self.polygons.at(mesh.prim, code, polygons)
         points = np.where(np.isfinite(points), points, 0.0)
         if mesh.surface is not None:
-            points, own = mesh.surface.shape(points)
+            points, own = mesh.shape(points, code)
             normals = own or (normals and mesh.surface.carry(normals))
         return points, normals
 
@@ -341,7 +352,8 @@ class MeshReader:
         """A primvar on the corners of the mesh, or of its refined surface; None if there is none."""
         if (name, width) in mesh.carried:
             return mesh.carried[name, width]
-        found = read_primvar(mesh.prim, name, width, self.code, mesh.counts, mesh.corners, self.report, self.polygons.frames)
+        frames, layout = self.polygons.frames, (mesh.counts, mesh.corners)
+        found = read_primvar(mesh.prim, name, width, self.code, *layout, self.report, frames, mesh.varying)
         if found is not None and mesh.surface is not None:
             found = mesh.carried[name, width] = mesh.surface.carry(found)
         return found
@@ -352,8 +364,8 @@ class MeshReader:
             return self._display_color(mesh, corners)
         color = self._primvar(mesh, look.color_primvar, 3)
         if color is None:
-            why = f"{look.path} reads primvars:{look.color_primvar}; its default is used"
-            self.report.about("materials").warn(mesh.prim.GetPath(), "mesh without the colours of its material", why)
+            why = f"{look.path} reads primvars:{look.color_primvar}; the default that the material gives is used"
+            self.report.about("materials").note(mesh.prim.GetPath(), "mesh without the colours of its material", why)
             color = CornerValues(np.array([look.color_default or (0.0,) * 3]), np.zeros(len(corners), int), True)
         rgb = np.clip(color.values * look.color_scale, 0.0, 1.0)
         return replace(color, values=np.hstack([rgb, np.full((len(rgb), 1), look.base_color[3])]))

@@ -10,7 +10,7 @@ import hashlib
 from collections.abc import Callable
 
 import numpy as np
-from pxr import UsdShade
+from pxr import Usd, UsdShade
 
 from .arnold_nodes import FUNCTIONS as ARNOLD
 from .evaluator import Evaluator
@@ -21,7 +21,7 @@ from .preview_surface import PreviewSurfaces
 from .quantities import Lost, Part, Primvar, Quantity
 from .report import Notebook
 from .shader_network import Link, Network, Node, literals
-from .stage import Frames, changes
+from .stage import PROTOTYPE_PREDICATE, Frames, changes
 from .surface_models import COLOR, MODELS, Inputs, Model, Read
 from .textures import Textures
 
@@ -46,9 +46,11 @@ class NetworkSurfaces:
     ) -> None:
         self.images = NetworkImages(textures)
         self.builder, self.previews, self.frames, self.report = builder, previews, frames, report
+        self._primvars: set[str] | None = None
 
     def look(self, path: str, shader: UsdShade.Shader) -> Look | None:
         """The look of a material's surface; None if no model has its shader. Raises `Lost` for networks that are too large."""
+        self._stage = shader.GetPrim().GetStage()
         node = self._surface(path, Network(shader).surface)
         model = MODELS.get(node.kind)
         if model is None and node.kind in ARNOLD | {"arnold:image": None}:
@@ -63,6 +65,17 @@ class NetworkSurfaces:
         if "useSpecularWorkflow" in read:
             return self.previews.look_of(path, values)
         return self.builder.look(path, values)
+
+    def is_anywhere(self, primvar: str) -> bool:
+        """Whether any prim of the stage has a primvar."""
+        if self._primvars is None:
+            self._primvars = {
+                name.removeprefix("primvars:")
+                for prim in Usd.PrimRange(self._stage.GetPseudoRoot(), PROTOTYPE_PREDICATE)
+                for name in prim.GetAuthoredPropertyNames()
+                if name.startswith("primvars:")
+            }
+        return primvar in self._primvars
 
     def _surface(self, path: str, node: Node) -> Node:
         """The shader that says what the surface is, behind those that only hand it on."""
@@ -106,7 +119,8 @@ class _Inputs(Inputs):
         )
 
     def _held(self, name: str, value: Quantity) -> Quantity:
-        """A quantity that glTF may hold: of the primvars only colours of a mesh."""
+        """A quantity that glTF may hold: of the primvars only colours of a mesh, and those that nothing has."""
+        value = _by_default(value, lambda primvar: bool(primvar.default) and not self.surfaces.is_anywhere(primvar.name))
         for basis in value.bases():
             if isinstance(basis, Primvar) and (name not in _BASE_COLORS or _primvar_color(value.wide(3)) is None):
                 raise Lost(f"it depends on {basis.name}, which no texture can hold")
@@ -241,6 +255,20 @@ class _Inputs(Inputs):
         if not self.quiet:
             report = self._lights if name in self.model.emission else self.surfaces.report
             report.warn(self.path, f"{prefix}{self.name} {name}".strip(), why)
+
+
+def _by_default(quantity: Quantity, is_default: Callable[[Primvar], bool]) -> Quantity:
+    """A quantity with what primvars are by default in the place of some of them."""
+    by_default = {basis: basis.default[basis.index] for basis in quantity.bases() if isinstance(basis, Primvar) and is_default(basis)}
+    if not by_default:
+        return quantity
+    return Quantity([
+        Part(
+            part.constant + sum(weight * by_default.get(basis, 0.0) for basis, weight in part.terms.items()),
+            {basis: weight for basis, weight in part.terms.items() if basis not in by_default},
+        )
+        for part in quantity.parts
+    ])
 
 
 def _primvar_color(quantity: Quantity) -> Value | None:

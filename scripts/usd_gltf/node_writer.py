@@ -144,7 +144,11 @@ class NodeWriter:
                 place = _place(*(part[position] for part in static[:3]))
                 index, outer = self._placed(name, prototype.name, place, None)
             self._fill(index, prototype, name, world @ matrix if prototype.lit else world, chain)
-            nodes.append(self._seen(prototype, outer))
+            outer = self._seen(prototype, outer)
+            if placements.seen is not None:
+                outer = hide(self.document, self.frames, outer, prototype.name, placements.seen)
+                self.report.count("animation channels")
+            nodes.append(outer)
         return nodes
 
     def _seen(self, prim: Prim, node: int) -> int:

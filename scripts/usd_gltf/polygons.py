@@ -1,4 +1,4 @@
-"""The polygons of meshes and intrinsic gprims as they are posed, at the first frame and at other times."""
+"""The polygons of meshes and intrinsic gprims, and the control points of curves, as they are posed, at the first frame and at other times."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from pxr import Usd, UsdGeom
 
-from . import gprims
+from . import curves, gprims
 from .animation import NOISE
 from .normals import Split
 from .primvars import CornerValues, as_rows, normals_may_vary, normals_vary, read_normals
@@ -16,7 +16,7 @@ from .skinning import Skinning
 from .stage import Frames, changes
 from .velocities import points_at, points_move
 
-_TOPOLOGY = ("faceVertexCounts", "faceVertexIndices")
+_TOPOLOGY = ("faceVertexCounts", "faceVertexIndices", "curveVertexCounts")
 
 
 class Unlike(Exception):
@@ -25,7 +25,8 @@ class Unlike(Exception):
 
 @dataclass
 class Polygons:
-    """A mesh posed at the first frame: `points` (v, 3), `counts` (f,) and `corners` (c,) of its faces."""
+    """A mesh posed at the first frame: `points` (v, 3), `counts` (f,) and `corners` (c,) of its faces. Of curves, points are control
+    vertices, and faces whole curves."""
 
     points: np.ndarray
     counts: np.ndarray
@@ -37,6 +38,8 @@ class Polygons:
     """Whether it moves otherwise than as a whole, and nothing is in the way of carrying that."""
     split: Split | None = None
     """Which corners share a normal, if it deforms and has normals."""
+    layout: curves.Layout | None = None
+    """How the control vertices make curves."""
 
 
 class PolygonReader:
@@ -48,10 +51,11 @@ class PolygonReader:
     def first(self, prim: Usd.Prim) -> Polygons | None:
         """The polygons at the first frame; None (reported) if they make no mesh."""
         code, is_gprim = self.frames.first, prim.GetTypeName() in gprims.TYPES
-        found = self._gprim(prim, code) if is_gprim else self._mesh(prim)
+        is_curves = prim.GetTypeName() == curves.TYPE
+        found = self._gprim(prim, code) if is_gprim else self._curves(prim) if is_curves else self._mesh(prim)
         if found is None:
             return None
-        names = gprims.SIZES if is_gprim else ("points", *_TOPOLOGY)
+        names = gprims.SIZES if is_gprim else curves.ATTRIBUTES if is_curves else ("points", *_TOPOLOGY)
         changed = [name for name in names if changes(prim.GetAttribute(name), self.frames)]
         found.changed = [f"animated {name}" for name in changed]
         if not is_gprim and points_move(prim, self.frames, self.report.about("animation")):
@@ -61,6 +65,7 @@ class PolygonReader:
             found.changed.append("skinned mesh that deforms")
         # A subdivision surface has normals of its own.
         turns = not is_gprim and _is_polygonal(prim) and normals_vary(prim, self.frames)
+        turns |= is_curves and any(name not in ("points", *_TOPOLOGY) for name in changed)
         if turns and not found.changed:
             found.changed.append("animated normals")
         if found.changed:
@@ -141,6 +146,8 @@ class PolygonReader:
 
     def _normals(self, prim: Usd.Prim, code: float, found: Polygons) -> CornerValues | None:
         """The normals authored at a time."""
+        if found.layout is not None:
+            return None
         if prim.GetTypeName() in gprims.TYPES:
             return self._gprim(prim, code).normals
         return read_normals(prim, code, found.counts, found.corners, self.report, None if found.deforms else self.frames)
@@ -156,6 +163,16 @@ class PolygonReader:
         shape = gprims.build(prim, code)
         normals = CornerValues(shape.normals, np.arange(len(shape.corners)))
         return Polygons(shape.points, shape.counts, shape.corners, normals)
+
+    def _curves(self, prim: Usd.Prim) -> Polygons | None:
+        """The same of BasisCurves."""
+        points = points_at(prim, self.frames.first)
+        layout = curves.read_layout(prim, self.frames.first, len(points), self.report)
+        if layout is None:
+            return None
+        if self.skinning.bends(prim) and curves.read_directions(prim, self.frames.first, layout, self.report) is not None:
+            self.report.warn(prim.GetPath(), "ribbons that a skeleton bends", "their normals are as authored, and do not turn with it")
+        return Polygons(points, layout.counts, np.arange(len(points)), layout=layout)
 
     def _mesh(self, prim: Usd.Prim) -> Polygons | None:
         """What a Mesh is at the first frame, not yet posed; None (reported) if that is no mesh."""
@@ -178,4 +195,5 @@ class PolygonReader:
 
 
 def _is_polygonal(prim: Usd.Prim) -> bool:
-    return UsdGeom.Mesh(prim).GetSubdivisionSchemeAttr().Get() == UsdGeom.Tokens.none
+    """Whether normals mean something: not of subdivision surfaces. Those of curves say how ribbons lie."""
+    return prim.IsA(UsdGeom.Mesh) and UsdGeom.Mesh(prim).GetSubdivisionSchemeAttr().Get() == UsdGeom.Tokens.none

@@ -16,7 +16,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from pxr import Gf, Usd, UsdGeom, UsdLux, UsdShade
 
-from . import gprims
+from . import curves, gprims
 from .arnold_placement import placement
 from .cameras import read_camera
 from .fog import is_fog, read_fog
@@ -218,7 +218,7 @@ class PrimTree:
         geometry_light = self._geometry_lights.get(str(path))
         if kind == "Volume":
             compiled.fog = read_fog(prim, self.frames, self.report.about("other"))
-        if prim.IsA(UsdGeom.Mesh) or kind in gprims.TYPES:
+        if prim.IsA(UsdGeom.Mesh) or kind in gprims.TYPES or kind == curves.TYPE:
             light_prim = geometry_light or prim
             is_light = light_type(light_prim) is not None
             compiled.mesh = self.meshes.read(prim)
@@ -268,15 +268,23 @@ class PrimTree:
         """The prototypes of a PointInstancer, which is `seen` so, and where they are put."""
         path = str(prim.GetPath())
         targets = UsdGeom.PointInstancer(prim).GetPrototypesRel().GetForwardedTargets()
-        for number, placements in read_placements(prim, self.frames, self.report).items():
+        for number, groups in read_placements(prim, self.frames, self.report).items():
             if number < 0 or number >= len(targets):
                 why = f"protoIndices name {number}, but there are {len(targets)} prototypes; they are left out"
                 self.report.warn(path, "instances without a prototype", why)
                 continue
             prototype = self._prototype(str(targets[number]), path, seen)
-            if prototype is not None:
-                compiled.instances.append((prototype, placements))
-                self.report.count("instances", len(placements.numbers))
+            if prototype is None:
+                continue
+            drawn = is_drawn(self.stage.GetPrimAtPath(targets[number]))
+            for placements in groups:
+                own, at = prototype, placements.seen
+                if at is not None and (prototype.lit or _resets(prototype)):
+                    masks = (at if mask is None else mask & at for mask in (seen.at, seen.drawn))
+                    own = self._prototype(str(targets[number]), path, Seen(*masks, seen.is_left_out))
+                if own is not None:
+                    compiled.instances.append((own, placements if drawn else replace(placements, seen=None)))
+                    self.report.count("instances", len(placements.numbers))
 
     def _prototype(self, target: str, instancer: str, seen: Seen) -> Prim | None:
         """A prototype compiled once for all instancers that are `seen` alike. What hides them hides it, not what
@@ -295,6 +303,11 @@ class PrimTree:
             self._prototypes[key] = self._compile(prim, None, PROTOTYPE_PREDICATE, seen)
             self._open.discard(target)
         return self._prototypes[key]
+
+
+def _resets(prim: Prim) -> bool:
+    """Whether something below a prim is not moved with it."""
+    return any(child.resets or _resets(child) for child in prim.children)
 
 
 def _over_time(xformable: UsdGeom.Xformable, frames: Frames) -> np.ndarray:

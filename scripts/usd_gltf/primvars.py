@@ -36,15 +36,23 @@ def as_rows(value, width: int, kind: type = float) -> np.ndarray:
 
 
 def spread(
-    values: np.ndarray, interpolation: str, indices: np.ndarray | None, counts: np.ndarray, corners: np.ndarray
+    values: np.ndarray,
+    interpolation: str,
+    indices: np.ndarray | None,
+    counts: np.ndarray,
+    corners: np.ndarray,
+    varying: int | None = None,
 ) -> CornerValues | None:
-    """Spread values over face corners; None if there are too few of them."""
+    """Spread values over face corners; None if there are too few of them. Of curves, corners are control vertices, faces whole curves,
+    and there are so many `varying` values, which are left by themselves."""
     if interpolation == "constant":
         index = np.zeros(len(corners), int)
     elif interpolation == "uniform":
         index = np.repeat(np.arange(len(counts)), counts)
     elif interpolation == "faceVarying":
         index = np.arange(len(corners))
+    elif interpolation == "varying" and varying is not None:
+        index = np.arange(varying)
     else:
         index = corners
     if indices is not None:
@@ -65,6 +73,7 @@ def read_primvar(
     corners: np.ndarray,
     report: Notebook,
     frames: Frames | None = None,
+    varying: int | None = None,
 ) -> CornerValues | None:
     """The primvar `name` (inherited ones too) with `width` numbers a value; None if there is none. It is reported if
     it differs between two of the `frames`, which are left out where it is read at each of them."""
@@ -76,7 +85,7 @@ def read_primvar(
     interpolation = primvar.GetInterpolation()
     values = as_rows(primvar.Get(code), width).reshape(-1, width)
     indices = as_rows(primvar.GetIndices(code), 1, int) if primvar.IsIndexed() else None
-    found = spread(values, interpolation, indices, counts, corners)
+    found = spread(values, interpolation, indices, counts, corners, varying)
     if found is None:
         why = f"{primvar.GetTypeName()} with too few {interpolation} values; left out"
         report.warn(prim.GetPath(), f"primvars:{name} does not fit its mesh", why)

@@ -133,6 +133,10 @@ class Skinning:
         binding = self._deforming(prim)
         return (points, normals) if binding is None else self._posed(binding, points, corners, normals, code)
 
+    def bends(self, prim: Usd.Prim) -> bool:
+        """Whether a skeleton puts points of a prim elsewhere, and not the prim as a whole."""
+        return self._deforming(prim) is not None
+
     def may_deform(self, prim: Usd.Prim) -> bool:
         """Whether a skeleton deforms the mesh, and its pose changes."""
         return self._deforming(prim) is not None and any(self.differs(prim, code) for code in self.frames.codes)

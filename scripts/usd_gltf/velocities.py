@@ -72,7 +72,8 @@ def _fault(values: Usd.Attribute, velocities: Usd.Attribute, accelerations: Usd.
     if not has_seconds(values.GetStage()):
         return "timeCodesPerSecond is not positive"
     if not samples or velocities.GetTimeSamples() != samples:
-        return f"their time samples are {_named(velocities.GetTimeSamples())}, those of {values.GetName()} {_named(samples)}"
+        theirs, others = _named(velocities.GetTimeSamples()), _named(samples)
+        return f"they are sampled at {theirs}, {values.GetName()} at {others}; USD uses them only where both are sampled at the same time codes"
     count = len(values.Get(at) or ())
     return "" if len(given) == count else f"they are {len(given)}, but {values.GetName()} are {count}"
 
@@ -84,4 +85,5 @@ def has_seconds(stage: Usd.Stage) -> bool:
 
 def _named(samples: list[float]) -> str:
     shown = ", ".join(f"{code:g}" for code in samples[:3])
-    return (shown + ", ..." if len(samples) > 3 else shown) or "none"
+    shown += ", ..." if len(samples) > 3 else ""
+    return f"time code {shown}" if shown else "no time code"

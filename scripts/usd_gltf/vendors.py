@@ -67,7 +67,11 @@ def report_others(
         report.idle(prim.GetPath(), idle)
     for namespace, found in lines.items():
         what = f"{namespace} attributes" if namespace else "attributes that USD does not know"
-        report.warn(prim.GetPath(), what, f"they have no carrier: {', '.join(found)}")
+        own = [name for name in said if namespace == "arnold" and any(line.split(" = ")[0].endswith(f":{name}") for line in found)]
+        why = f"they have no carrier: {', '.join(found)}"
+        if own:
+            why += f" ({', '.join(own)} stand{'s' * (len(own) == 1)} beside USD's own, which count)"
+        report.warn(prim.GetPath(), what, why)
 
 
 def _is_idle(words: list[str], value, said: Mapping[str, object]) -> bool:

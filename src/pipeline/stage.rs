@@ -44,7 +44,7 @@ pub struct StageOptions {
     /// Only these prims, what is below them, and what they need
     #[arg(long, value_name = "/PRIM[,/PRIM...]")]
     pub mask: Option<String>,
-    /// How far subdivision surfaces are refined: low, medium, high or veryhigh; high if not given
+    /// How far subdivision surfaces and curves are refined: low, medium, high or veryhigh; high if not given
     #[arg(long, value_name = "LEVEL")]
     pub complexity: Option<String>,
     /// Select a variant; may be given again, and is taken in this order

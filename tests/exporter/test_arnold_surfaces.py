@@ -205,6 +205,21 @@ def test_primvars(gltf):
     assert base(gltf(text.replace("rel material", primvar, 1))) == pytest.approx([0.8, 0.4, 0])
 
 
+@pytest.mark.parametrize("scaled", [False, True])
+def test_what_no_prim_has_is_its_default_wherever_it_is_read(export, scaled):
+    """A glow of a primvar has no carrier, but where it is the same everywhere because nothing has it."""
+    data = shader("N", "user_data_rgb", 'string inputs:attribute = "hue"\n color3f inputs:default = (0.5, 0.25, 1)')
+    if scaled:
+        data += shader("D", "multiply", link("input1", "N") + "color3f inputs:input2 = (2, 2, 2)")
+    text = arnold(link("emission_color", "D" if scaled else "N") + "float inputs:emission = 3\n", data)
+    result = export(text, "--strict")
+    assert result.code == 0, result.err
+    assert Gltf(result.path).nits("/M") == pytest.approx(np.array([1.5, 0.75, 3]) * (1 + scaled))
+    for kind in ("def", "class"):
+        elsewhere = f'{kind} Scope "Elsewhere" {{ color3f[] primvars:hue = [(1, 0, 0)] }}'
+        assert export(f"{text}\n{elsewhere}").warned("lights") == {"standard_surface emission_color"}
+
+
 def test_equal_meshes_in_instances_keep_their_colors(gltf, tmp_path):
     data = shader("N", "user_data_rgb", 'string inputs:attribute = "hue"')
     text = network(link("base_color", "N"), data, "arnold:standard_surface", "arnold:", quad=QUAD)

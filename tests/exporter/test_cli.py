@@ -334,6 +334,18 @@ def test_a_layer_that_changes_while_it_is_read_is_exported_again(export, tmp_pat
     assert "up to date" in export(tmp_path / "scene.usda").out
 
 
+@pytest.mark.parametrize(("arc", "what", "why"), [
+    ("references = @b.usda@</Nope>", "missing prim of a reference", "b.usda has no prim /Nope, which the reference at /A of scene.usda names"),
+    ("payload = @b.usda@</Nope>", "missing prim of a payload", "b.usda has no prim /Nope, which the payload at /A of scene.usda names"),
+    ("references = @b.usda@", "missing prim of a reference", "b.usda has no defaultPrim, and the reference at /A of scene.usda names none"),
+    ("references = </Gone>", "missing prim of a reference", "scene.usda has no prim /Gone, which the reference at /A names"),
+])  # fmt: skip
+def test_a_prim_that_is_named_and_not_there_is_told_of(export, tmp_path, arc, what, why):
+    (tmp_path / "b.usda").write_text('#usda 1.0\ndef Xform "B" {\n}\n')
+    result = export(LAMP + f'\ndef Xform "A" ({arc}) {{}}')
+    assert result.warned() == {what} and why in result.said()
+
+
 def test_a_missing_source_is_one_line(export, tmp_path):
     result = export(tmp_path / "nowhere.usd")
     assert result.code == 1

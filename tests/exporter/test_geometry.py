@@ -210,9 +210,9 @@ def test_faces_at_non_finite_points_are_left_out(export):
 
 def test_kinds_without_a_carrier_are_reported(export):
     result = export(
-        """def BasisCurves "C" {}
+        """def NurbsCurves "C" {}
         def Points "P" {}
         def NurbsPatch "N" {}
         def Volume "V" {}"""
     )
-    assert {"BasisCurves", "Points", "NurbsPatch", "Volume"} <= result.warned()
+    assert {"NurbsCurves", "Points", "NurbsPatch", "Volume"} <= result.warned()

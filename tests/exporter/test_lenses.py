@@ -130,15 +130,85 @@ def test_of_animated_projections_the_first_frames_is_used(export):
 
 def test_a_picture_keeps_its_shape(export):
     lines = "float horizontalAperture.timeSamples = { 1: 30, 6: 60 }\n float horizontalApertureOffset = 3\n float verticalAperture = 20"
-    result = export(camera(lines))
-    assert result.warned("cameras") == {"animated camera aspect"}
+    result = export(camera(lines), "--strict")
+    assert result.code == 0 and "animated camera aspect" in result.noted()
     scene = Gltf(result.path)
     assert scene.json["cameras"][0]["perspective"]["aspectRatio"] == pytest.approx(1.5)
-    # As wide as the aperture, and so much less high.
+    # As wide as the aperture, and so much more high.
     for code, width in ((1, 30), (6, 60)):
         lens = shown(scene, code)
         assert lens["height"] == pytest.approx(2 * math.atan(width / 1.5 / (2 * 50)))
         assert lens["filmOffset"] == pytest.approx([3 / width, 0])
+
+
+def test_a_film_that_becomes_narrow_is_seen_to_its_full_height(export):
+    lines = "float horizontalAperture.timeSamples = { 1: 60, 6: 15 }\n float horizontalApertureOffset = 3\n float verticalAperture = 20"
+    result = export(camera(lines + "\n float verticalApertureOffset = 2"), "--strict")
+    assert result.code == 0, result.err
+    for code in (1, 3, 6):
+        lens = shown(Gltf(result.path), code)
+        assert lens["height"] == pytest.approx(2 * math.atan(20 / (2 * 50)))
+        assert lens["filmOffset"] == pytest.approx([3 / 60, 2 / 20])
+
+
+ARNOLDS = {
+    # (USD's lines, Arnold's parameters): aperture, focal length, offsets as a fraction; tenths of the unit.
+    "float[] primvars:arnold:fov = [60]": (2 * 50 * math.tan(math.pi / 6), 0.729697, (0, 0)),
+    "float2[] primvars:arnold:screen_window_min = [(-0.5, -0.5)]\n float2[] primvars:arnold:screen_window_max = [(0.5, 0.5)]":
+        (20.955 / 2, 0.729697, (0, 0)),
+    "float2 arnold:screen_window_min = (-1, 0)\n float2 arnold:screen_window_max = (0, 1)": (20.955 / 2, 0.729697, (-0.5, 0.5)),
+    "float primvars:arnold:fov = 90\n float2[] primvars:arnold:screen_window_max = [(2, 2)]": (150, 0.729697, (1 / 6, 1 / 6)),
+    "float2[] primvars:arnold:screen_window_max = [(1, 3)]": (20.955, 2 * 0.729697, (0, 0.25)),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("lines", ARNOLDS)
+def test_arnolds_lens_counts_where_usd_says_nothing(export, lines):
+    width, shape, offset = ARNOLDS[lines]
+    result = export(f'def Camera "C" {{ {lines} }}', "--strict")
+    assert result.code == 0, result.err
+    scene = Gltf(result.path)
+    lens = scene.json["cameras"][0]["perspective"]
+    assert lens["yfov"] == pytest.approx(2 * math.atan(width * shape / 100), rel=1e-5)
+    assert lens["aspectRatio"] == pytest.approx(1 / shape, rel=1e-5)
+    assert scene.node("/C")["extras"]["usdCamera"]["filmOffset"] == pytest.approx(offset, abs=1e-6)
+
+
+def test_arnolds_window_of_an_orthographic_camera_is_in_scene_units(export):
+    lines = """token projection = "orthographic"
+        float2[] primvars:arnold:screen_window_min = [(-3, -1)]
+        float2[] primvars:arnold:screen_window_max = [(1, 3)]"""
+    result = export(f'def Camera "C" {{ {lines} }}', "--strict")
+    assert result.code == 0, result.err
+    scene = Gltf(result.path)
+    window = scene.json["cameras"][0]["orthographic"]
+    assert window["xmag"] == pytest.approx(2) and window["ymag"] == pytest.approx(2 * 0.729697, rel=1e-5)
+    assert scene.node("/C")["extras"]["usdCamera"]["filmOffset"] == pytest.approx([-0.25, 0.25])
+
+
+def test_arnolds_focus_and_planes_count_where_usd_says_nothing_over_time_too(export):
+    lines = """float fStop = 2
+        float primvars:arnold:focus_distance.timeSamples = { 1: 2, 6: 7 }
+        float[] primvars:arnold:near_clip = [0.25]
+        float primvars:arnold:far_clip = 90"""
+    result = export(camera("").split("def")[0] + f'def Camera "C" {{ {lines} }}', "--strict")
+    assert result.code == 0, result.err
+    scene = Gltf(result.path)
+    extras = scene.node("/C")["extras"]["usdCamera"]
+    unit = 0.01
+    assert np.array(extras["clippingRange_m"]) == pytest.approx([0.25 * unit, 90 * unit])
+    assert extras["values"]["focusDistance_m"] == pytest.approx(np.arange(2, 8) * unit)
+
+
+def test_a_window_that_is_all_of_the_field_of_view_says_nothing(export):
+    lines = "float2[] primvars:arnold:screen_window_min = [(-1, -1)]\n float2[] primvars:arnold:screen_window_max"
+    assert "Arnold's" not in export(f'def Camera "C" {{ {lines} = [(1, 1)] }}', "--strict").said()
+    assert "Arnold's" in export(f'def Camera "C" {{ {lines}.timeSamples = {{ 1: [(1, 1)], 2: [(2, 2)] }} }}', "--strict").said()
+
+
+def test_a_window_that_is_empty_leaves_its_camera_out(export):
+    result = export('def Camera "C" { float2[] primvars:arnold:screen_window_max = [(-1, 1)] }')
+    assert result.warned("cameras") == {"camera without a field of view"} and "screen_window" in result.said()
 
 
 @pytest.mark.parametrize(

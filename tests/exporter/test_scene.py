@@ -136,19 +136,6 @@ def test_animated_instancers_move_their_instances(gltf):
     assert scene.channels("/I[1]") == {}
 
 
-def test_instances_that_vanish_are_reported(export):
-    result = export(
-        ANIMATED
-        + """def PointInstancer "I" {
-            rel prototypes = [</I/P>]
-            int[] protoIndices.timeSamples = { 1: [0, 0], 2: [0] }
-            point3f[] positions.timeSamples = { 1: [(0, 0, 0), (5, 0, 0)], 2: [(0, 2, 0)] }
-            def Cube "P" {}
-        }"""
-    )
-    assert "PointInstancer whose instances change" in result.warned()
-
-
 def test_visibility_and_purpose(gltf):
     text = """
         def Xform "Off" { token visibility = "invisible"
@@ -275,6 +262,7 @@ def test_orthographic_cameras_have_half_their_aperture_in_metres(gltf):
 def test_what_a_camera_loses_is_listed(export):
     text = """def Camera "Cam" {
         float4[] clippingPlanes = [(0, 1, 0, 2)]
+        float focusDistance = 4
         float primvars:arnold:focus_distance = 3
         float houdini:guidescale = 1
     }"""

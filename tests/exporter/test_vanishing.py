@@ -124,6 +124,105 @@ def test_prototypes_vanish_in_their_instances(export):
         assert (strengths(scene, f"/I[{number}]/L")[:, 0] > 0).tolist() == [True, False, False, True, True, False]
 
 
+def sampled(name, values):
+    return f"{name}.timeSamples = {{ " + ", ".join(f"{code}: {value}" for code, value in values.items()) + " }\n"
+
+
+BOTH = """def Xform "P" { def Cube "C" {}
+    def SphereLight "L" {}
+    def SphereLight "T" { bool treatAsPoint = 1 }
+    }"""
+
+
+def particles(*attributes, prototypes="</I/P>", inside=BOTH):
+    return SHOT + f'def PointInstancer "I" {{ rel prototypes = [{prototypes}]\n {"".join(attributes)} {inside}\n }}'
+
+
+def is_there(scene, name):
+    """At which frames an instance's cube and its lights are there, which must be the same."""
+    found = (sizes(scene, f"/I[{name}]/C") > 0).tolist()
+    for light in ("L", "T"):
+        given = scene.lux(f"/I[{name}]/{light}").get("values")
+        lit = [True] * 6 if given is None else (strengths(scene, f"/I[{name}]/{light}")[:, 0] > 0).tolist()
+        assert lit == found
+    return found
+
+
+def test_instances_that_appear_and_vanish_are_there_in_their_time(export):
+    text = particles(sampled("int[] protoIndices", {1: "[]", 2: "[0]", 4: "[0, 0]", 6: "[0]"}),
+                     sampled("point3f[] positions", {1: "[]", 2: "[(1, 0, 0)]", 4: "[(1, 2, 0), (5, 0, 0)]", 6: "[(1, 2, 0)]"}))  # fmt: skip
+    result = export(text, "--strict")
+    assert result.code == 0, result.err
+    scene = Gltf(result.path)
+    assert is_there(scene, 0) == [False, True, True, True, True, True]
+    assert is_there(scene, 1) == [False, False, False, True, True, False]
+    # Where they are is what USD says at each time; beyond it they stay.
+    stage = Usd.Stage.Open(str(result.path.with_name("scene.usda")))
+    instancer = UsdGeom.PointInstancer(stage.GetPrimAtPath("/I"))
+    for number in (0, 1):
+        for code in range(1, 7):
+            placed = instancer.ComputeInstanceTransformsAtTime(code, code)
+            if number < len(placed):
+                # What hides it has a size of 0 or 1 and moves nothing.
+                assert scene.world(f"/I[{number}]/C", (code - 1) / 24)[:3, 3] == pytest.approx(list(placed[number].ExtractTranslation()))
+    assert result.report["counts"]["instances"] == 2
+
+
+def test_instances_are_who_they_are_by_their_ids(export):
+    """Their order in the arrays says nothing."""
+    places = {7: [(k, 0, 0) for k in range(6)], 3: [(0, k, 0) for k in range(6)]}
+    order = {1: (7, 3), 2: (3, 7), 3: (7,), 4: (3,), 5: (3, 7), 6: (7, 3)}
+    rows = {code: ", ".join(str(places[i][code - 1]) for i in ids) for code, ids in order.items()}
+    text = particles(sampled("int64[] ids", {code: list(ids) for code, ids in order.items()}),
+                     sampled("int[] protoIndices", {code: [0] * len(ids) for code, ids in order.items()}),
+                     sampled("point3f[] positions", {code: f"[{row}]" for code, row in rows.items()}))  # fmt: skip
+    result = export(text, "--strict")
+    assert result.code == 0, result.err
+    scene = Gltf(result.path)
+    for identity in (7, 3):
+        seen = is_there(scene, identity)
+        assert seen == [identity in order[code] for code in range(1, 7)]
+        for step in np.flatnonzero(seen):
+            assert scene.world(f"/I[{identity}]/C", step / 24)[:3, 3] == pytest.approx(places[identity][step])
+
+
+def test_a_mask_and_a_changed_prototype_hide_what_they_hide(export):
+    two = BOTH + "\n" + BOTH.replace('"P"', '"Q"')
+    text = particles("int[] protoIndices.timeSamples = { 1: [0, 0, 1], 3: [1, 0, 1] }\n", "int64[] invisibleIds.timeSamples = { 1: [], 2: [1], 5: [] }\n",
+                     "point3f[] positions = [(0, 0, 0), (1, 0, 0), (2, 0, 0)]\n", prototypes="</I/P>, </I/Q>", inside=two)  # fmt: skip
+    result = export(text, "--strict")
+    assert result.code == 0, result.err
+    scene = Gltf(result.path)
+    assert is_there(scene, "0 of prototype 0") == [True, True, False, False, False, False]
+    assert is_there(scene, "0 of prototype 1") == [False, False, True, True, True, True]
+    assert is_there(scene, 1) == [True, False, False, False, True, True]
+    assert is_there(scene, 2) == [True] * 6
+    assert sum("_seen" in node["name"] for node in scene.nodes) == 3
+
+
+def test_what_hides_the_instancer_hides_instances_too(export):
+    text = particles("int[] protoIndices.timeSamples = { 1: [0], 5: [] }\n", "point3f[] positions.timeSamples = { 1: [(0, 0, 0)], 5: [] }\n", BLINK + "\n")
+    scene = Gltf(export(text, "--strict").path)
+    assert is_there(scene, 0) == [True, False, False, True, False, False]
+
+
+def test_instances_that_make_no_sense_for_a_while_are_not_there_then(export):
+    text = particles("int[] protoIndices.timeSamples = { 1: [0, 0], 3: [-7, 0], 4: [0, 0] }\n",
+                     "point3f[] positions.timeSamples = { 1: [(0, 0, 0), (1, 0, 0)], 5: [(0, 0, 0)] }\n")  # fmt: skip
+    result = export(text)
+    assert result.warned() == {"instances without a prototype", "PointInstancer without usable instances"}
+    assert "1 positions and 2 protoIndices do not fit each other at frame 5" in result.said()
+    scene = Gltf(result.path)
+    assert is_there(scene, "0 of prototype 0") == [True, True, False, True, False, False]
+    assert is_there(scene, 1) == [True, True, True, True, False, False]
+
+
+def test_prims_of_a_prototype_that_are_not_moved_with_it_vanish_with_it(export):
+    inside = 'def Xform "P" { def Cube "C" { uniform token[] xformOpOrder = ["!resetXformStack!"] } }'
+    text = particles("int[] protoIndices.timeSamples = { 1: [0], 3: [] }\n", "point3f[] positions.timeSamples = { 1: [(0, 0, 0)], 3: [] }\n", inside=inside)
+    assert (sizes(Gltf(export(text, "--strict").path), "/I[0]/C") > 0).tolist() == [True, True, False, False, False, False]
+
+
 def test_a_jump_within_an_open_shutter_is_held_until_the_next_sampled_time(export):
     camera = 'def Camera "V" { double shutter:open = 0\n double shutter:close = 0.5 }\n'
     times = 'token visibility.timeSamples = { 1: "inherited", 3: "invisible", 4.25: "inherited" }'

@@ -97,10 +97,10 @@ def test_points_with_further_samples_are_linear_whatever_the_velocities(gltf):
 
 
 @pytest.mark.parametrize(("points", "velocities", "why"), [
-    (at("point3f[] points", CORNERS), at("vector3f[] velocities", TURNS, 223), "their time samples are 223, those of points 224"),
-    (at("point3f[] points", CORNERS), at("vector3f[] velocities", TURNS, None), "their time samples are none, those of points 224"),
-    (at("point3f[] points", CORNERS, None), at("vector3f[] velocities", TURNS, 224), "their time samples are 224, those of points none"),
-    (at("point3f[] points", CORNERS, None), at("vector3f[] velocities", TURNS, None), "their time samples are none, those of points none"),
+    (at("point3f[] points", CORNERS), at("vector3f[] velocities", TURNS, 223), "they are sampled at time code 223, points at time code 224"),
+    (at("point3f[] points", CORNERS), at("vector3f[] velocities", TURNS, None), "they are sampled at no time code, points at time code 224"),
+    (at("point3f[] points", CORNERS, None), at("vector3f[] velocities", TURNS, 224), "they are sampled at time code 224, points at no time code"),
+    (at("point3f[] points", CORNERS, None), at("vector3f[] velocities", TURNS, None), "they are sampled at no time code, points at no time code"),
     (at("point3f[] points", CORNERS), at("vector3f[] velocities", TURNS[:5]), "they are 5, but points are 8"),
 ])  # fmt: skip
 def test_velocities_that_usd_does_not_use_are_told_of(export, points, velocities, why):
@@ -188,7 +188,7 @@ def test_velocities_of_instances_that_usd_does_not_use_are_told_of(export):
     """As arnold-usd's test 1868 has them: positions without a time, velocities with one."""
     result = export(shot() + instancer(at("point3f[] positions", PLACES, None), at("vector3f[] velocities", SPEEDS)))
     assert result.warned("animation") == {"velocities without effect"}
-    assert "those of positions none" in result.said()
+    assert "positions at no time code" in result.said()
     assert not Gltf(result.path).json.get("animations")
 
 

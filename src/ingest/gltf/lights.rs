@@ -71,7 +71,11 @@ pub(super) fn of_node(
     }
     let Some(index) = source.document.nodes[number].light else {
         if let Some(lux) = lux.filter(|_| source.document.nodes[number].mesh.is_none()) {
-            let text = format!("a {} has no carrier in glTF; left out", lux.kind);
+            let kind = &lux.kind;
+            let text = format!(
+                "nothing in the file gives the light of this {kind}; left out (the report of the \
+                 export says why: \"lights\")"
+            );
             output.notes.add(Category::Lights, object, text);
         }
         return Ok(None);
