@@ -232,6 +232,25 @@ fn light_that_few_rays_find_is_not_taken_for_none() {
     }
 }
 
+/// The small pictures that decide the floor may be black: because the lights are walled in, or because they are switched on
+/// in another frame. The first is done soon, the other has an error that can be told.
+#[test]
+fn a_shot_whose_small_pictures_are_black_has_a_floor() {
+    let grey = Grey::of([0.0; 4].into_iter());
+    for hole in [-0.05, 0.09] {
+        let stage = crack(hole);
+        let set = stage.set();
+        let studio = Studio { set: &set, settings: small() };
+        let goal = ErrorGoal { error: 0.1, grey, most: 1 << 12 };
+        let (film, _, reached) = studio.to_error(1, goal);
+        let lit = film.halves().iter().any(|pixel| pixel.luminance() > 0.0);
+        assert_eq!(lit, hole > 0.0);
+        assert!(reached.frame.error <= 0.1, "{hole}: {}", reached.frame.error);
+        let samples = film.taken().iter().sum::<u32>() as usize / film.taken().len();
+        assert!(samples < 1 << 11, "{hole}: {samples} samples");
+    }
+}
+
 /// Counts have no edge at rows or tiles: the mean difference between neighbours is the same across
 /// every multiple as elsewhere.
 #[test]

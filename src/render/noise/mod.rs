@@ -56,10 +56,10 @@ impl Grey {
         (luminance > 0.0 && luminance.is_finite()).then_some(Grey(luminance))
     }
 
-    /// The floor of pictures whose middle is at a luminance. Black pictures have the smallest floor there
-    /// is.
+    /// The floor of pictures whose middle is at a luminance. Of black pictures, which tell of none, it is that of middle
+    /// grey, 0.18 of white: relative to no floor at all, the first light would be an error without end.
     pub fn below(middle: f64) -> Grey {
-        Grey::new(Grey::SHARE * middle).unwrap_or(Grey(f64::MIN_POSITIVE))
+        Grey::new(Grey::SHARE * middle).unwrap_or(Grey(Grey::SHARE * 0.18))
     }
 
     /// Its luminance.
