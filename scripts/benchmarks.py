@@ -155,6 +155,17 @@ def profile(quick):
     return f"Direct light, one light at a point:\n\n{one}\n\nFive bounces, the default knob:\n\n{default}"
 
 
+def learned(quick):
+    told(["cargo", "build", "--release", "--quiet", "--bins"])
+    names = ["two_rooms", "behind_house", "lamps_10", "lamps_100", "lamps_1000", "spiral_points", "spiral_mesh"]
+    few = ["--probes", "32", "--seeds", "1", "--reference", "16"]
+    with tempfile.TemporaryDirectory() as folder:
+        chosen = names[:1] if quick else names
+        make_scenes(folder, *chosen)
+        scenes = [Path(folder) / f"{name}.glb" for name in chosen]
+        return told([sys.executable, "scripts/learned.py", TARGET / "release", *scenes, *(few if quick else [])]).strip()
+
+
 BLOCKS = {
     "costs": (costs, "cargo bench --bench light_tree"),
     "one_changed": (one_changed, "cargo bench --bench light_tree"),
@@ -162,9 +173,10 @@ BLOCKS = {
     "one_frame": (one_frame, "python3 scripts/one_frame.py target/release"),
     "opening": (opening, "candelabra build; candelabra-render"),
     "profile": (profile, "python3 scripts/profile.py target/release SCENE..."),
+    "learned": (learned, "python3 scripts/learned.py target/release SCENE..."),
     "what_is_paid": (what_is_paid, "python3 scripts/what_is_paid.py"),
 }
-FILES = ("README.md", "docs/measurements.md", "docs/one_frame.md", "docs/profile.md", "docs/beside_others.md")
+FILES = ("README.md", "docs/measurements.md", "docs/one_frame.md", "docs/profile.md", "docs/beside_others.md", "docs/visibility.md")
 
 
 def machine():
