@@ -38,10 +38,11 @@ def variances(program, scene, options, table, folder):
             "--learned", table, "--json", found, *WAYS,
         )
         rows = {row["name"]: row for row in json.loads(found.read_text())["exact"]["strategies"]}
-        for way, sum in sums.items():
+        for way in WAYS:
+            # Where nothing is hidden, the table says nothing.
             plain, learned = rows[way], rows.get(f"{way}, learned", rows[way])
             of_seed = (plain["variance"], learned["variance"], plain["median"], learned["median"])
-            sums[way] = [a + b / options.seeds for a, b in zip(sum, of_seed)]
+            sums[way] = [mean + own / options.seeds for mean, own in zip(sums[way], of_seed)]
     return sums
 
 

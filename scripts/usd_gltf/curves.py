@@ -20,7 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 from pxr import Usd, UsdGeom
 
-from .primvars import CornerValues, as_rows, finite, spread
+from .primvars import CornerValues, as_rows, finite, read_normals, spread
 from .report import Notebook
 
 TYPE = "BasisCurves"
@@ -29,7 +29,7 @@ ATTRIBUTES = ("points", "curveVertexCounts", "widths", "primvars:widths", "norma
 """What shapes them over time."""
 
 DEFAULT_WIDTH = 1.0
-"""In the curves' own space, where none is authored: RenderMan's default (RiCurves), and twice Arnold's default radius."""
+"""In the curves' own space, where none is authored. USD has no default."""
 
 _MATRICES = {
     "linear": [[0, 0, 0, 0], [0, 0, 0, 0], [-1, 1, 0, 0], [1, 0, 0, 0]],
@@ -227,7 +227,7 @@ def read_widths(prim: Usd.Prim, code: float, layout: Layout, report: Notebook) -
         flat, interpolation = curves.GetWidthsAttr().Get(code), str(curves.GetWidthsInterpolation())
     values = as_rows(flat, 1)[:, None]
     if not len(values):
-        why = f"a tube of {DEFAULT_WIDTH:g} unit is drawn, as RenderMan and Arnold do; usdrecord draws lines of one pixel. Author widths"
+        why = f"a tube of {DEFAULT_WIDTH:g} unit is drawn; usdrecord draws lines of one pixel. Author widths"
         report.warn(prim.GetPath(), "curves without widths", why)
         return None
     sizes = {"constant": 1, "uniform": len(layout.counts), "varying": int(layout.varying.sum()), "vertex": int(layout.counts.sum())}
@@ -238,27 +238,11 @@ def read_widths(prim: Usd.Prim, code: float, layout: Layout, report: Notebook) -
             report.warn(prim.GetPath(), "widths do not fit their curves", why)
             return None
         interpolation = fitting[0]
-    return finite(_spread(values, interpolation, layout))
+    vertices = np.arange(layout.counts.sum())
+    return finite(spread(values, interpolation, None, layout.counts, vertices, int(layout.varying.sum())))
 
 
 def read_directions(prim: Usd.Prim, code: float, layout: Layout, report: Notebook) -> CornerValues | None:
-    """The normals (n, 3) of ribbons; None if the curves have none, and are tubes."""
-    primvar = UsdGeom.PrimvarsAPI(prim).GetPrimvar("normals")
-    if primvar and primvar.HasAuthoredValue():
-        flat, interpolation = primvar.ComputeFlattened(code), str(primvar.GetInterpolation())
-    else:
-        flat, interpolation = prim.GetAttribute("normals").Get(code), str(UsdGeom.PointBased(prim).GetNormalsInterpolation())
-    values = as_rows(flat, 3)
-    if not len(values):
-        return None
-    found = _spread(values, interpolation, layout)
-    if found is None:
-        why = f"too few {interpolation} values; tubes are drawn, not ribbons"
-        report.warn(prim.GetPath(), "normals do not fit their curves", why)
-        return None
-    return finite(found)
-
-
-def _spread(values: np.ndarray, interpolation: str, layout: Layout) -> CornerValues | None:
+    """The normals (n, 3) of ribbons; None if the curves have none that fit (reported), and are tubes."""
     vertices = np.arange(layout.counts.sum())
-    return spread(values, interpolation, None, layout.counts, vertices, int(layout.varying.sum()))
+    return read_normals(prim, code, layout.counts, vertices, report, varying=int(layout.varying.sum()))

@@ -113,10 +113,16 @@ def normals_vary(prim: Usd.Prim, frames: Frames) -> bool:
 
 
 def read_normals(
-    prim: Usd.Prim, code: float, counts: np.ndarray, corners: np.ndarray, report: Notebook, frames: Frames | None = None
+    prim: Usd.Prim,
+    code: float,
+    counts: np.ndarray,
+    corners: np.ndarray,
+    report: Notebook,
+    frames: Frames | None = None,
+    varying: int | None = None,
 ) -> CornerValues | None:
     """`primvars:normals`, else the `normals` attribute of a point-based prim."""
-    found = read_primvar(prim, "normals", 3, code, counts, corners, report, frames)
+    found = read_primvar(prim, "normals", 3, code, counts, corners, report, frames, varying)
     if found is not None:
         return found
     attribute = prim.GetAttribute("normals")
@@ -124,7 +130,7 @@ def read_normals(
     if not len(values):
         return None
     interpolation = UsdGeom.PointBased(prim).GetNormalsInterpolation()
-    found = spread(values, interpolation, None, counts, corners)
+    found = spread(values, interpolation, None, counts, corners, varying)
     if found is None:
         report.warn(prim.GetPath(), "normals do not fit their mesh", f"too few {interpolation} values; left out")
         return None
