@@ -139,7 +139,7 @@ fn sketch(integrator: &Integrator, aim: Aim, scale: f64) -> (Sketch, Expected) {
         if paths == PATHS[0] {
             return (sketch, expected);
         }
-        let sketch = Sketch::of(integrator, (cells as u32, paths), grey);
+        let sketch = sketch.with_paths(integrator, paths);
         let expected = sketch.expects(aim, settings);
         return (sketch, expected);
     }
@@ -230,7 +230,7 @@ fn pixel(
                 trial.next_path(index);
             }
         };
-        sketch.expose(&mut halves, (cell, half), integrator, &mut scratch, begin);
+        sketch.again(&mut halves, (cell, half), integrator, &mut scratch, begin);
         let found = scratch.trial.as_ref().map(|trial| trial.differences).unwrap_or_default();
         for (sum, difference) in picking.as_flattened_mut().iter_mut().zip(found.as_flattened()) {
             // Half a squared difference is the variance of a half's mean; a quarter of it that of both.

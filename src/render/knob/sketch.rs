@@ -35,14 +35,20 @@ const MANY: u32 = 1 << 12;
 /// where one pixel in fifty has all of it and 160 are looked at.
 const SURE: f64 = 2.0;
 
-/// Some pixels of a frame.
+/// Some pixels of a frame, one in each cell of a grid.
 pub(super) struct Sketch {
-    size: [u32; 2],
-    columns: u32,
-    rows: u32,
+    grid: Grid,
     paths: u32,
     pixels: Vec<Halves>,
     grey: Grey,
+}
+
+/// Cells of a picture, row after row.
+struct Grid {
+    /// Of the picture, pixels.
+    size: [u32; 2],
+    columns: u32,
+    rows: u32,
 }
 
 /// How many samples a frame gets, by its sketch.
@@ -53,48 +59,21 @@ pub(super) struct Expected {
     pub shares: Vec<f64>,
 }
 
-impl Sketch {
-    /// A sketch of at least so many pixels, if the picture has as many, with so many paths in each half of a pixel. The
-    /// floor is that of the frame, in the unit of radiance; the geometric mean of the pixels decides if it is not known.
-    pub fn of(integrator: &Integrator, (pixels, paths): (u32, u32), grey: Option<Grey>) -> Sketch {
-        let RenderSettings { width, height, .. } = *integrator.settings;
-        let columns = f64::from(pixels) * f64::from(width) / f64::from(height);
+impl Grid {
+    /// Of at least so many cells, if the picture has as many pixels, about as long as wide.
+    fn of(cells: u32, size: [u32; 2]) -> Grid {
+        let [width, height] = size;
+        let columns = f64::from(cells) * f64::from(width) / f64::from(height);
         let columns = (columns.sqrt().round() as u32).clamp(1, width);
-        let rows = pixels.div_ceil(columns).clamp(1, height);
-        let mut sketch = Sketch {
-            size: [width, height],
-            columns,
-            rows,
-            paths,
-            pixels: Vec::new(),
-            grey: Grey::below(0.0),
-        };
-        let trace = |cell| {
-            let mut halves = Halves::default();
-            for half in 0..2 {
-                let scratch = &mut PathScratch::default();
-                sketch.expose(&mut halves, (cell, half), integrator, scratch, |_, _| {});
-            }
-            halves
-        };
-        sketch.pixels = (0..columns * rows).into_par_iter().map(trace).collect();
-        let luminances = || sketch.pixels.iter().map(Halves::luminance);
-        sketch.grey = grey.unwrap_or_else(|| Grey::of(luminances()));
-        sketch
+        Grid { size, columns, rows: cells.div_ceil(columns).clamp(1, height) }
     }
 
-    /// Cells of the grid.
-    pub fn cells(&self) -> u32 {
+    fn cells(&self) -> u32 {
         self.columns * self.rows
     }
 
-    /// The floor that its errors are relative to, in the unit of radiance.
-    pub fn grey(&self) -> Grey {
-        self.grey
-    }
-
     /// The pixel of a cell: anywhere in it, so that nothing regular in the picture meets the grid.
-    pub fn place(&self, cell: u32) -> [u32; 2] {
+    fn place(&self, cell: u32) -> [u32; 2] {
         let at = |number: u32, cells: u32, length: u32, salt: u32| {
             let within = f64::from(hash(hash(SEED, salt), cell)) / 4_294_967_296.0;
             let place = (f64::from(number) + within) * f64::from(length) / f64::from(cells);
@@ -105,28 +84,69 @@ impl Sketch {
         [at(x, self.columns, width, 1), at(y, self.rows, height, 2)]
     }
 
-    /// Traces the paths of one half of a cell's pixel and puts what they show into its halves. `before` hears the seed and
-    /// the number of each path.
-    pub fn expose(
+    /// Adds paths to one half of a cell's pixel until it has so many. `before` hears the seed and the number of each.
+    fn expose(
         &self,
         halves: &mut Halves,
-        (cell, half): (u32, usize),
+        (cell, half, paths): (u32, usize, u32),
         integrator: &Integrator,
         scratch: &mut PathScratch,
         mut before: impl FnMut(&mut PathScratch, (u32, u32)),
     ) {
         let [x, y] = self.place(cell);
         let seed = hash(hash(SEED, y * integrator.settings.width + x), half as u32);
-        let mut sum = 0.0;
-        for index in 0..self.paths {
+        let taken = halves.counts[half];
+        let mut sum = halves.means[half] * f64::from(taken);
+        for index in taken..paths {
             before(scratch, (seed, index));
             let light = integrator.trace(x, y, seed, index, scratch).radiance;
             let or_none = |light: f64| if light.is_finite() { light } else { 0.0 };
             sum += or_none(luminance(light).into());
             halves.blocked += or_none(scratch.blocked);
         }
-        halves.counts[half] = self.paths;
-        halves.means[half] = sum / f64::from(self.paths);
+        halves.counts[half] = paths;
+        halves.means[half] = sum / f64::from(paths);
+    }
+}
+
+impl Sketch {
+    /// A sketch of at least so many pixels, if the picture has as many, with so many paths in each half of a pixel. The
+    /// floor is that of the frame, in the unit of radiance; the geometric mean of the pixels decides if it is not known.
+    pub fn of(integrator: &Integrator, (pixels, paths): (u32, u32), grey: Option<Grey>) -> Sketch {
+        let RenderSettings { width, height, .. } = *integrator.settings;
+        let grid = Grid::of(pixels, [width, height]);
+        let mut pixels = vec![Halves::default(); grid.cells() as usize];
+        trace(integrator, &grid, &mut pixels, paths);
+        let grey = grey.unwrap_or_else(|| Grey::of(pixels.iter().map(Halves::luminance)));
+        Sketch { grid, paths, pixels, grey }
+    }
+
+    /// The same with more paths in each half of a pixel, under the same floor.
+    pub fn with_paths(mut self, integrator: &Integrator, paths: u32) -> Sketch {
+        trace(integrator, &self.grid, &mut self.pixels, paths);
+        Sketch { paths, ..self }
+    }
+
+    /// What a pixel of the sketch shows when it is traced again. `before` hears the seed and the number of each path.
+    pub fn again(
+        &self,
+        halves: &mut Halves,
+        (cell, half): (u32, usize),
+        integrator: &Integrator,
+        scratch: &mut PathScratch,
+        before: impl FnMut(&mut PathScratch, (u32, u32)),
+    ) {
+        self.grid.expose(halves, (cell, half, self.paths), integrator, scratch, before);
+    }
+
+    /// Its pixels.
+    pub fn cells(&self) -> u32 {
+        self.grid.cells()
+    }
+
+    /// The floor that its errors are relative to, in the unit of radiance.
+    pub fn grey(&self) -> Grey {
+        self.grey
     }
 
     /// Paths through a pixel, in each of its two halves.
@@ -137,7 +157,7 @@ impl Sketch {
     /// About so many of its cells, or all, spread evenly.
     pub fn some(&self, pixels: u32) -> Vec<u32> {
         let every = (self.cells() / pixels.max(1)).max(1);
-        let place = |cell: &u32| cell % self.columns + 3 * (cell / self.columns);
+        let place = |cell: &u32| cell % self.grid.columns + 3 * (cell / self.grid.columns);
         (0..self.cells()).filter(|cell| place(cell).is_multiple_of(every)).collect()
     }
 
@@ -171,14 +191,24 @@ impl Sketch {
         let needed = allotment.needed(&estimate, goal.error);
         let left = |(pixel, count): (usize, &f64)| estimate.own_of_one_sample(pixel) / count;
         let left: Vec<f64> = needed.iter().enumerate().map(left).collect();
-        let [width, height] = self.size.map(f64::from);
+        let [width, height] = self.grid.size.map(f64::from);
         let more = margin(&left, width * height);
         allotment.needed(&estimate, goal.error / more.sqrt())
     }
 
     fn estimate(&self) -> Estimate {
-        Estimate::of(&self.pixels, self.columns as usize, self.grey)
+        Estimate::of(&self.pixels, self.grid.columns as usize, self.grey)
     }
+}
+
+/// Adds paths to the pixels of a grid until each half has so many.
+fn trace(integrator: &Integrator, grid: &Grid, pixels: &mut [Halves], paths: u32) {
+    pixels.par_iter_mut().enumerate().for_each(|(cell, halves)| {
+        let scratch = &mut PathScratch::default();
+        for half in 0..2 {
+            grid.expose(halves, (cell as u32, half, paths), integrator, scratch, |_, _| {});
+        }
+    });
 }
 
 /// The factor on the mean of a frame of so many pixels that it proves to be below, by the squared errors of some of them.
