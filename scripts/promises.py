@@ -109,6 +109,7 @@ def main():
     parser.add_argument("scenes", nargs="+")
     parser.add_argument("--res", default="96x54")
     parser.add_argument("--depth", default="1")
+    parser.add_argument("--frame", help="which frame, if not the first")
     parser.add_argument("--reference", type=int, default=8192, help="samples of each half of the converged picture")
     parser.add_argument("--seeds", type=int, default=4, help="pictures of each kind")
     parser.add_argument("--errors", type=float, nargs="*", default=[0.1, 0.05, 0.02])
@@ -120,6 +121,7 @@ def main():
     for scene in options.scenes:
         with tempfile.TemporaryDirectory() as folder:
             knobs = ["--res", options.res, "--depth", options.depth]
+            knobs += ["--frames", options.frame] if options.frame else []
             shot = Shot(str(options.programs / "candelabra-render"), scene, knobs, folder)
             name = f"{Path(scene).stem}_{options.res}_{options.depth}_{options.reference}.npy"
             kept = options.references and options.references / name

@@ -215,6 +215,7 @@ fn halves(sums: &[f64], taken: u32, scale: f64) -> Halves {
     Halves {
         counts,
         means: [mean(0), mean(1)],
+        brightest: sums::brightest(sums) * scale,
         blocked: sums::blocked(sums) * scale * scale,
         is_spoilt: counts[0] + counts[1] < taken,
     }

@@ -4,7 +4,7 @@ use super::super::cryptomatte::ObjectIds;
 use super::super::layers::{Aov, Layer};
 use super::super::motion::Motion;
 use super::super::path::PathSample;
-use crate::math::color::Rgb;
+use crate::math::color::{Rgb, luminance};
 use crate::scene::Pose;
 use glam::{DVec2, DVec3};
 
@@ -30,8 +30,10 @@ const BLOCKED: usize = 6;
 const LEFT_OUT: usize = 7;
 /// Samples that hit anything.
 pub(super) const COVERED: usize = 9;
+/// The luminance of the brightest sample: no sum, but kept beside them.
+const BRIGHTEST: usize = 10;
 /// What every film has.
-const ALWAYS: usize = 10;
+const ALWAYS: usize = 11;
 
 /// Where a pixel's sums are that not every film has; `None` if nobody asked.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -105,6 +107,7 @@ impl Layout {
             return false;
         }
         add(sums, RADIANCE + 3 * half, sample.radiance);
+        sums[BRIGHTEST] = sums[BRIGHTEST].max(luminance(sample.radiance).into());
         if blocked.is_finite() {
             sums[BLOCKED] += blocked;
         }
@@ -165,6 +168,11 @@ pub(super) fn radiance(sums: &[f64], half: usize) -> DVec3 {
 /// The squared luminance of blocked light, summed.
 pub(super) fn blocked(sums: &[f64]) -> f64 {
     sums[BLOCKED]
+}
+
+/// The luminance of the brightest sample.
+pub(super) fn brightest(sums: &[f64]) -> f64 {
+    sums[BRIGHTEST]
 }
 
 /// Samples of each half that were left out.

@@ -32,7 +32,7 @@ const PLAIN: u64 = 8;
 const LEAST_PIXELS: u64 = 24;
 /// One pixel of the first sketch for so many of the frame, which has at least as many samples in each. It tells how many it
 /// will have.
-const FRAME_PIXELS: u64 = 64;
+const FRAME_PIXELS: u64 = 16;
 /// No pixel is more than this share of the noise: one bright sample would decide alone.
 const LARGEST_SHARE: f64 = 0.125;
 /// The first of [`KNOBS`] that are tried only if the one before turns out to be the best: they cost most.
@@ -174,10 +174,11 @@ fn findings(
 ) -> Findings {
     let error = |of: &dyn Fn(&Pixel) -> f64| {
         let own = |(pixel, share): &(Pixel, f64)| {
-            // As that of a pixel with halves so far apart: small errors are relative, large ones are not as large.
+            // Small errors are relative, large ones are not as large.
             let [whole, off] = [pixel.halves.luminance(), of(pixel).sqrt()];
-            let means = [whole + off, whole - off];
-            Halves { means, ..pixel.halves }.squared_error(sketch.grey()) / share
+            let [above, below] =
+                [off, -off].map(|off| sketch.grey().squared_error(whole + off, whole));
+            0.5 * (above + below) / share
         };
         steady_mean(pixels.iter().map(own).collect())
     };

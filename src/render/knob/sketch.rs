@@ -101,7 +101,9 @@ impl Grid {
             before(scratch, (seed, index));
             let light = integrator.trace(x, y, seed, index, scratch).radiance;
             let or_none = |light: f64| if light.is_finite() { light } else { 0.0 };
-            sum += or_none(luminance(light).into());
+            let light = or_none(luminance(light).into());
+            sum += light;
+            halves.brightest = halves.brightest.max(light);
             halves.blocked += or_none(scratch.blocked);
         }
         halves.counts[half] = paths;
