@@ -77,8 +77,9 @@ def is_linked(prim: Usd.Prim) -> bool:
 
 
 def is_hidden(prim: Usd.Prim, code: float) -> bool:
-    """Whether a filter is invisible, by itself or what is above it. hdPrman leaves such a filter out (light.cpp)."""
-    above = prim
+    """Whether a filter is invisible, by itself or what is above it. hdPrman leaves such a filter out (light.cpp). Nothing hides
+    a shader."""
+    above = None if prim.GetTypeName() == "Shader" else prim
     while above and not above.IsPseudoRoot():
         visibility = UsdGeom.Imageable(above).GetVisibilityAttr() if above.IsA(UsdGeom.Imageable) else above.GetAttribute("visibility")
         if visibility and visibility.Get(code) == UsdGeom.Tokens.invisible:

@@ -192,6 +192,12 @@ def test_a_blocker_of_a_material_that_a_light_names(export):
     assert Gltf(result.path).lux("/L")["filters"] == ["/M/F"]
 
 
+def test_nothing_hides_a_shader(export):
+    light, _, graph = filtered(blocker(BOX)).partition("\ndef ")
+    text = light.replace('"/G"', '"/X/G"') + '\ndef Xform "X" { token visibility = "invisible"\n def ' + graph.replace("</G", "</X/G") + "\n}"
+    assert Gltf(export(text, "--strict").path).lux("/L")["filters"] == ["/X/G/F"]
+
+
 def test_a_blocker_moves(export):
     moving = BOX.replace("geometry_matrix = ", "geometry_matrix.timeSamples = { 1: ") + ", 5: ((1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 1, 0), (0, 0, 0, 1)) }"
     result = export(FRAMES + filtered(blocker(moving)), "--strict")
