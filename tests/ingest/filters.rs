@@ -61,7 +61,7 @@ fn filters_are_read_and_found_by_path() {
 #[test]
 fn filters_that_are_not_there_or_unknown_are_noted() {
     let scene = load(&with_filters(&["/Gone", "/F0"], &[json!({"type": "gobo"})]));
-    assert_eq!(scene.light_filters.of_instance(0), []);
+    assert!(scene.light_filters.of_instance(0).is_empty());
     let said = format!("{:?}", scene.notes);
     for words in ["/Gone is not in the file", "/F0 is not in the file", "unknown type \\\"gobo\\\""]
     {
