@@ -1,6 +1,7 @@
 """PointInstancers: where their instances stand, and which prototype each one is, over time.
 
-An instance is who it is by its id, or by its place in the arrays where there are no ids (usdGeom/schema.usda). One that
+An instance is who it is by its id, or by its place in the arrays where there are no ids (usdGeom/schema.usda), or none that are
+one for each instance at all times. One that
 appears, vanishes or is masked for a while is seen at some of the sampled times; one that changes its prototype is as many as it
 has prototypes, each seen in its time.
 """
@@ -22,6 +23,23 @@ from .velocities import has_seconds, instances_move
 Key = tuple[int, int]
 """The id of an instance, and its prototype."""
 
+MOST_PLACES = 1 << 24
+"""Matrices of a prim over time, of 128 bytes each: as many as there are sampled times for each instance that is ever there."""
+MOST_PLACES_OF_A_STAGE = 1 << 25
+
+
+@dataclass
+class Room:
+    """What is left of a stage's matrices over time."""
+
+    left: int = MOST_PLACES_OF_A_STAGE
+
+    def takes(self, count: int) -> bool:
+        """Whether as many more fit; they are then taken."""
+        fits = count <= min(MOST_PLACES, self.left)
+        self.left -= count if fits else 0
+        return fits
+
 
 @dataclass
 class Placements:
@@ -34,36 +52,66 @@ class Placements:
     """(times,) when they are there; None if always."""
 
 
-def read_placements(prim: Usd.Prim, frames: Frames, report: Notebook) -> dict[int, list[Placements]]:
-    """Placements of each prototype, by its index in `prototypes`."""
+def read_placements(prim: Usd.Prim, frames: Frames, room: Room, report: Notebook) -> dict[int, list[Placements]]:
+    """Placements of each prototype, by its index in `prototypes`; the first frame's alone if they do not fit into the room."""
     instancer = UsdGeom.PointInstancer(prim)
     moves = _moves(instancer) or instances_move(instancer, frames, report.about("animation"))
     codes = frames.codes if moves else (frames.first,)
-    states = []
+    states, held = [], 0
     for code in codes:
         matrices, prototypes, shown, ids = _state(instancer, code)
         if len(matrices) != len(prototypes):
             why = f"{_lengths(instancer, code)} do not fit each other"
             later = f" at frame {code:g}; nothing of it is seen then" if code != frames.first else ""
             report.warn(prim.GetPath(), "PointInstancer without usable instances", why + later)
-            matrices, prototypes, shown, ids = (part[:0] for part in (matrices, prototypes, shown, ids))
+            matrices, prototypes, shown = (part[:0] for part in (matrices, prototypes, shown))
+            ids = np.zeros(0, int)
         good = np.isfinite(matrices).all(axis=(-1, -2))
         if not good.all():
             report.warn(prim.GetPath(), "instances at non-finite places", "they are left out")
         states.append(_State(matrices, prototypes, shown & good, ids))
-    if all(state.is_like(states[0]) for state in states):
-        return _steady(states)
-    return _changing(states)
+        held += len(matrices)
+        if held > MOST_PLACES:
+            break
+    _settle_ids(prim, states, codes, report)
+    is_steady = all(state.is_like(states[0]) for state in states)
+    if moves:
+        count = held if is_steady else len(codes) * len(_identities(states))
+        if held > MOST_PLACES or not room.takes(count):
+            why = f"it has more than {MOST_PLACES} places (of instances at {len(codes)} times; {MOST_PLACES_OF_A_STAGE} a stage); "
+            why += "the first frame's are used. Export fewer frames at a time, or split it"
+            report.about("animation").warn(prim.GetPath(), "PointInstancer too large over time", why)
+            return _steady([states[frames.rest] if len(states) > frames.rest else states[0]])
+    return _steady(states) if is_steady else _changing(states)
+
+
+def _settle_ids(prim: Usd.Prim, states: list[_State], codes: tuple[float, ...], report: Notebook) -> None:
+    """Give instances their places in the arrays for ids if these are not one for each at all times."""
+    filled = [(code, state.ids is None) for code, state in zip(codes, states, strict=False) if len(state.prototypes)]
+    without = [code for code, is_without in filled if is_without]
+    if not without:
+        return
+    if len(without) < len(filled):
+        why = f"at frame {without[0]:g}, and elsewhere they are; instances are told apart by their places in the arrays at all times"
+        report.about("animation").warn(prim.GetPath(), "ids that are not one for each instance", why)
+    for state in states:
+        state.ids = np.arange(len(state.prototypes))
+
+
+def _identities(states: list[_State]) -> np.ndarray:
+    """(n, 2): ids and prototypes of all instances that are ever seen."""
+    seen = [np.column_stack([state.ids, state.prototypes])[state.shown] for state in states]
+    return np.unique(np.concatenate(seen), axis=0)
 
 
 @dataclass
 class _State:
-    """All instances at one time: matrices (n, 4, 4), prototype indices, whether they are seen, ids."""
+    """All instances at one time: matrices (n, 4, 4), prototype indices, whether they are seen, ids if they are one for each."""
 
     matrices: np.ndarray
     prototypes: np.ndarray
     shown: np.ndarray
-    ids: np.ndarray
+    ids: np.ndarray | None
 
     def is_like(self, other: _State) -> bool:
         """Whether the same instances are there."""
@@ -116,7 +164,7 @@ def _moves(instancer: UsdGeom.PointInstancer) -> bool:
     return any(attribute.ValueMightBeTimeVarying() for attribute in attributes)
 
 
-def _state(instancer: UsdGeom.PointInstancer, code: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+def _state(instancer: UsdGeom.PointInstancer, code: float) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray | None]:
     """Matrices, prototype indices, visibility and ids of all instances at a time code. Ids that are not one for each instance are none."""
     time = Usd.TimeCode(code)
     kind = UsdGeom.PointInstancer
@@ -129,9 +177,8 @@ def _state(instancer: UsdGeom.PointInstancer, code: float) -> tuple[np.ndarray, 
     shown = np.array(mask, dtype=bool) if len(mask) == len(prototypes) else np.ones(len(prototypes), bool)
     stack = column(np.array(matrices, dtype=float).reshape(-1, 4, 4))
     ids = as_rows(instancer.GetIdsAttr().Get(time), 1, int)
-    if len(ids) != len(prototypes) or len(np.unique(ids)) != len(ids):
-        ids = np.arange(len(prototypes))
-    return stack, prototypes, shown, ids
+    is_one_for_each = len(ids) == len(prototypes) and len(np.unique(ids)) == len(ids)
+    return stack, prototypes, shown, ids if is_one_for_each else None
 
 
 def _lengths(instancer: UsdGeom.PointInstancer, code: float) -> str:

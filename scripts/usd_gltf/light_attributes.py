@@ -4,6 +4,9 @@ UsdLux has named its inputs `inputs:intensity` since USD 21.02. Older files say 
 arnold-usd reads `primvars:arnold:intensity` on a UsdLux light besides (`ReadArnoldParameters` in its
 read_light.cpp). `LightAttributes` takes the first name that has an authored value, in that order,
 and reports every name but the first.
+
+A mesh with `primvars:arnold:light` is a mesh light of Arnold's, whose parameters are below that name
+(`ReadMeshLight` in arnold-usd's read_geometry.cpp). They are all that is read of it.
 """
 
 from __future__ import annotations
@@ -12,7 +15,7 @@ import functools
 import math
 
 import numpy as np
-from pxr import Gf, Sdf, Usd, UsdShade
+from pxr import Gf, Sdf, Usd, UsdGeom, UsdLux, UsdShade
 
 from .color_spaces import is_known, to_rec709
 from .report import Notebook
@@ -46,12 +49,26 @@ def arnold_names(parameter: str) -> tuple[str, str]:
     return f"primvars:arnold:{parameter}", f"arnold:{parameter}"
 
 
+def is_arnolds_mesh_light(prim: Usd.Prim) -> bool:
+    """Whether Arnold alone makes a light of a mesh."""
+    if prim.HasAPI(UsdLux.MeshLightAPI) or not prim.IsA(UsdGeom.Mesh):
+        return False
+    return any(prim.GetAttribute(name).Get(Usd.TimeCode.EarliestTime()) for name in arnold_names("light") if prim.HasAttribute(name))
+
+
+def arnold_names_of(prim: Usd.Prim, parameter: str) -> tuple[str, str]:
+    """The attributes that give a light prim one of Arnold's parameters."""
+    return arnold_names(f"light:{parameter}" if is_arnolds_mesh_light(prim) else parameter)
+
+
 class LightAttributes:
     """The inputs of one light prim."""
 
     def __init__(self, prim: Usd.Prim, frames: Frames, report: Notebook) -> None:
         self.prim, self.frames, self.report = prim, frames, report
         self.path = prim.GetPath()
+        self.is_arnolds = is_arnolds_mesh_light(prim)
+        """Whether it is a mesh light of Arnold's; these are normalized if nothing else is authored."""
         self.color_link: Usd.Attribute | None = None
         """`inputs:color`, if a shader's output is connected to it."""
         self.color_output: Usd.Attribute | None = None
@@ -84,7 +101,7 @@ class LightAttributes:
         """Value at a time code; the fallback where there is none, or none of a fitting type."""
         attribute = self._found[name]
         value = attribute.Get(code) if attribute else None
-        fallback = FALLBACKS[name]
+        fallback = True if self.is_arnolds and name == "normalize" else FALLBACKS[name]
         if value is None or fallback is None:
             return fallback if value is None else value
         fitting = _like(fallback, value)
@@ -139,6 +156,11 @@ class LightAttributes:
         return attribute if any(isinstance(v, Sdf.AssetPath) and v.path for v in values) else None
 
     def _find(self, name: str) -> Usd.Attribute | None:
+        if self.is_arnolds:
+            found = map(self.prim.GetAttribute, arnold_names(f"light:{_ARNOLD[name]}") if name in _ARNOLD else ())
+            found = [attribute for attribute in found if attribute and attribute.HasAuthoredValue()]
+            self.used |= {attribute.GetName() for attribute in found}
+            return next(iter(found), None)
         own = self.prim.GetAttribute(f"inputs:{name}")
         own = self._connected(own) if own and own.HasAuthoredConnections() else own
         if not own and name in _OF_THE_SCHEMA:

@@ -1,10 +1,11 @@
-"""Light filters: what only multiplies a light is put into it; all others are reported, and leave the light as it is.
+"""Light filters: what only multiplies a light is put into it, what `filter_kinds` can carry stands at a node that the light
+names, all others are reported and leave the light as it is.
 
 | filter | meaning | source |
 |---|---|---|
 | `PxrIntMultLightFilter` | times `intensity * 2^exposure`, or over that with `invert` | RenderMan's documentation; hdPrman (lightFilterUtils.cpp) reads no `density` and no `combineMode` of it |
 | `arnold:light_decay` without near and far attenuation; `arnold:light_blocker` of density 0 | nothing | Arnold's user guide |
-| `LightFilter` without `lightFilter:shaderId` | nothing | usdLux/schema.usda |
+| `LightFilter` without `lightFilter:shaderId`; one that is inactive or invisible | nothing | usdLux/schema.usda; hdPrman (light.cpp) |
 
 A filter link multiplies for some geometry alone. Then the filter is lost, unless it holds everything.
 """  # noqa: E501
@@ -12,11 +13,13 @@ A filter link multiplies for some geometry alone. Then the filter is lost, unles
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 
 from pxr import Sdf, Usd, UsdShade
 
-from .light_attributes import LightAttributes
-from .light_networks import SHADERS, connected, graph_of
+from .filter_kinds import BLOCKER, DECAY, Lost, carrier, combines, is_hidden, is_linked, kind_of, varying
+from .light_attributes import LightAttributes, arnold_names_of
+from .light_networks import connected, graph_of
 from .stage import changes
 
 MULTIPLIER = "PxrIntMultLightFilter"
@@ -24,31 +27,49 @@ _NEUTRAL = {"diffuse": 1.0, "specular": 1.0, "saturation": 1.0, "colorSaturation
 _READ = ("intensity", "exposure", "invert")
 _WITHOUT_MEANING = ("density", "combineMode")
 _MOST_IN_A_GRAPH = 64
+_PLACED_NOWHERE = ("DistantLight", "DomeLight", "DomeLight_1")
 
 
 class LightFilters:
     """The filters of one light."""
 
-    def __init__(self, inputs: LightAttributes) -> None:
+    def __init__(self, inputs: LightAttributes, kind: str) -> None:
         self.inputs = inputs
         self._multipliers: list[Usd.Prim] = []
         prim, lost = inputs.prim, []
         for target in _targets(prim):
-            found = prim.GetStage().GetPrimAtPath(target)
-            if found and found.GetTypeName() == MULTIPLIER and not _why_not(found):
+            if not prim.GetStage().GetPrimAtPath(target):
+                lost.append(f"{target} (it is not there)")
+        for found in filters_of(prim, inputs.frames.first):
+            if found.GetTypeName() == MULTIPLIER and not _why_not(found):
                 self._multipliers.append(found)
-            elif not (found and _is_idle(found)):
-                lost.append(f"{target} ({_why_not(found) if found else 'it is not there'})")
-        for name in SHADERS:
-            graph = graph_of(prim, name)
-            shaders = [shader for shader in _arnold_filters(graph)] if graph else []
-            lost += [f"{shader.GetPath()} ({shader.GetIdAttr().Get()})" for shader in shaders if not _is_idle(shader.GetPrim())]
+                continue
+            why = why_lost(found, kind, inputs.frames.first)
+            if why:
+                lost.append(f"{found.GetPath()} ({why})")
+            else:
+                self._say(found)
         if lost:
             why = f"they have no carrier; the light is exported without {', '.join(dict.fromkeys(lost))}"
             inputs.report.warn(inputs.path, "light filters", why)
         for found in self._multipliers:
             why = "it multiplies the light, and is put into it"
             inputs.report.note(inputs.path, f"light filter {found.GetPath()}", why)
+
+    def _say(self, found: Usd.Prim) -> None:
+        """Report what of a filter that is carried is not as the stage says."""
+        report, path = self.inputs.report, found.GetPath()
+        names = varying(found, self.inputs.frames)
+        if names:
+            report.warn(path, "animated light filter", f"of {', '.join(names)} the first frame's values are used")
+        extras = carrier(found, self.inputs.frames.first, 1.0)
+        if any(start < end for start, end in (extras[name] for name in ("near", "far") if name in extras)):
+            why = 'Arnold\'s user guide says that it fades by "a smooth ramp", but not by which; it is a smoothstep'
+            report.warn(path, "ramp of a light_decay", why)
+        if len(extras.get("ramp", ())) > 6:
+            why = "its falloff is a spline of places and values, as OSL has it; RenderMan's documentation does not say which"
+            report.note(path, "falloff of a light filter", why)
+        report.note(path, "light filter", "it is carried")
 
     @property
     def vary(self) -> bool:
@@ -60,27 +81,62 @@ class LightFilters:
         return math.prod(_multiplier(prim, code) for prim in self._multipliers)
 
 
+def filters_of(light: Usd.Prim, code: float) -> list[Usd.Prim]:
+    """The filters of a light that do something: prims of filters, and Arnold's shaders."""
+    found = dict.fromkeys(_all_of(light))
+    return [prim for prim in found if not _is_idle(prim) and not is_hidden(prim, code)]
+
+
+def carried(light: Usd.Prim, kind: str, code: float) -> list[Usd.Prim]:
+    """Those that stand at nodes of their own."""
+    return [prim for prim in filters_of(light, code) if prim.GetTypeName() != MULTIPLIER and not why_lost(prim, kind, code)]
+
+
+def why_lost(found: Usd.Prim, kind: str, code: float) -> str:
+    """Why a filter of a light of some kind cannot be carried; empty if it can."""
+    if found.GetTypeName() == MULTIPLIER:
+        return _why_not(found)
+    if kind_of(found) == DECAY and kind in _PLACED_NOWHERE:
+        return "its light is at no distance"
+    if combines(found, code):
+        return "it is combined with others"
+    try:
+        carrier(found, code, 1.0)
+    except Lost as lost:
+        return str(lost)
+    return ""
+
+
+def _all_of(light: Usd.Prim) -> Iterator[Usd.Prim]:
+    stage = light.GetStage()
+    for target in _targets(light):
+        found = stage.GetPrimAtPath(target)
+        if found and found.IsA(UsdShade.Material):
+            outputs = (connected(found, name) for name in ("outputs:arnold:surface", "outputs:surface"))
+            found = next((output.GetPrim() for output in outputs if output is not None), found)
+        if found:
+            yield found
+    for name in arnold_names_of(light, "shaders"):
+        graph = graph_of(light, name)
+        names = ["outputs:filters", *(f"outputs:filters:i{number}" for number in range(1, _MOST_IN_A_GRAPH + 1))]
+        outputs = (connected(graph, name) for name in names) if graph else ()
+        yield from (output.GetPrim() for output in outputs if output is not None)
+
+
 def _targets(light: Usd.Prim) -> list[Sdf.Path]:
     # Files before USD 21.02 say `filters`.
     relationships = (light.GetRelationship(name) for name in ("light:filters", "filters"))
     return list(dict.fromkeys(path for found in relationships if found for path in found.GetForwardedTargets()))
 
 
-def _arnold_filters(graph: Usd.Prim) -> list[UsdShade.Shader]:
-    names = ["outputs:filters", *(f"outputs:filters:i{number}" for number in range(1, _MOST_IN_A_GRAPH + 1))]
-    outputs = (connected(graph, name) for name in names)
-    return [UsdShade.Shader(output.GetPrim()) for output in outputs if output is not None]
-
-
 def _is_idle(prim: Usd.Prim) -> bool:
     """Whether a filter does nothing."""
-    if prim.GetTypeName() == "LightFilter":
-        return not prim.GetAttribute("lightFilter:shaderId").Get()
-    shader = UsdShade.Shader(prim)
-    kind = str(shader.GetIdAttr().Get() or "") if shader else ""
-    if kind == "arnold:light_decay":
+    kind = kind_of(prim)
+    if kind == "LightFilter" or not prim.IsActive():
+        return True
+    if kind == DECAY:
         return not any(_given(prim, f"inputs:{name}", False) for name in ("use_near_atten", "use_far_atten"))
-    return kind == "arnold:light_blocker" and _given(prim, "inputs:density", 1.0) == 0.0
+    return kind == BLOCKER and _given(prim, "inputs:density", 1.0) == 0.0
 
 
 def _given(prim: Usd.Prim, name: str, default: object) -> object:
@@ -93,9 +149,7 @@ def _given(prim: Usd.Prim, name: str, default: object) -> object:
 
 
 def _why_not(prim: Usd.Prim) -> str:
-    """Why a filter does not only multiply; empty if that is all that it does."""
-    if prim.GetTypeName() != MULTIPLIER:
-        return str(prim.GetTypeName()) or "it has no type"
+    """Why a multiplier does not only multiply; empty if that is all that it does."""
     for attribute in prim.GetAuthoredAttributes():
         words = attribute.GetName().split(":")
         if words[0] in ("collection", "ui", "xformOp", "visibility", "purpose", "xformOpOrder"):
@@ -107,10 +161,7 @@ def _why_not(prim: Usd.Prim) -> str:
             return f"its {name} is {attribute.Get(Usd.TimeCode.EarliestTime())}"
         if name not in (*_READ, *_NEUTRAL, *_WITHOUT_MEANING) and words[0] in ("inputs", "ri"):
             return f"nobody knows its {name}"
-    links = {p.GetBaseName(): p for p in prim.GetAuthoredPropertiesInNamespace("collection:filterLink")}
-    root = links.pop("includeRoot", None)
-    links.pop("expansionRule", None)
-    return "it is linked to some geometry alone" if links or (root and not root.Get()) else ""
+    return "it is linked to some geometry alone" if is_linked(prim) else ""
 
 
 def _multiplier(prim: Usd.Prim, code: float) -> float:

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from pxr import Usd
 
-from .light_attributes import arnold_names
+from .light_attributes import arnold_names, arnold_names_of
 from .report import Notebook
 
 _LPE_GROUP = "ri:attributes:identifier:lpegroup"
@@ -39,7 +39,8 @@ _NONE = ("", "default")
 
 def read_group(prim: Usd.Prim, code: float, report: Notebook) -> str | None:
     """The group's name, or None; attributes that name another are reported."""
-    said = [(name, value) for name in NAMES if (value := _value(prim, name, code, report)) is not None]
+    names = (NAMES[0], *arnold_names_of(prim, "aov"), *NAMES[3:])
+    said = [(name, value) for name in names if (value := _value(prim, name, code, report)) is not None]
     for name, value in said[1:]:
         if value != said[0][1]:
             why = f"it names {value!r}; {said[0][0]} names {said[0][1]!r}, which is used"

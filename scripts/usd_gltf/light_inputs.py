@@ -19,7 +19,7 @@ from pxr import Sdf, Usd, UsdLux
 
 from . import light_groups, light_visibility
 from .arnold_placement import placement_names
-from .light_attributes import LightAttributes, is_finite
+from .light_attributes import LightAttributes, arnold_names, arnold_names_of, is_arnolds_mesh_light, is_finite
 from .light_filters import LightFilters
 from .light_losses import report_losses
 from .light_networks import Computed, LightNetworks
@@ -109,7 +109,7 @@ class Light:
 
 def light_type(prim: Usd.Prim) -> str | None:
     """The UsdLux type of a light prim, `MeshLight` and `VolumeLight` by their API; else None."""
-    if prim.HasAPI(UsdLux.MeshLightAPI):
+    if prim.HasAPI(UsdLux.MeshLightAPI) or is_arnolds_mesh_light(prim):
         return "MeshLight"
     if prim.HasAPI(UsdLux.VolumeLightAPI):
         return "VolumeLight"
@@ -125,7 +125,7 @@ def read_light(
     light = Light(
         path=str(prim.GetPath()),
         type=kind,
-        rgb=_emission(inputs, computed, LightFilters(inputs)),
+        rgb=_emission(inputs, computed, LightFilters(inputs, kind)),
         texels=None if computed is None else computed.texels,
         normalize=_track([bool(inputs.at("normalize", code)) for code in _codes(inputs, "normalize")]),
         # The schema names these without `inputs:`.
@@ -133,7 +133,7 @@ def read_light(
         is_line=kind == "CylinderLight" and _flag(prim, "treatAsLine", frames),
         force=_flag(prim, "candelabra:force", frames),
         casts_shadows=bool(inputs.still("shadow:enable")),
-        material_sync=str(prim.GetAttribute("light:materialSyncMode").Get() or "noMaterialResponse"),
+        material_sync="independent" if inputs.is_arnolds else str(prim.GetAttribute("light:materialSyncMode").Get() or "noMaterialResponse"),
         inputs=_verbatim(inputs),
         visibility=light_visibility.read_visibility(prim, kind, frames.first, report),
         group=light_groups.read_group(prim, frames.first, report),
@@ -150,10 +150,27 @@ def read_light(
         light.pole_z = pole == "Z" or (pole == "scene" and up == "Z")
     _shape(light, read_shapings(inputs, kind), frames)
     report_losses(inputs)
+    if inputs.is_arnolds:
+        _report_arnolds(inputs, light)
+        return light
     read = inputs.names | light_visibility.NAMES | set(light_groups.NAMES)
     read |= {"filters", "treatAsPoint", "treatAsLine"} | placement_names(prim)
     report_others(prim, read, frames.first, report, _in_arnolds_words(light, inputs), _idle(kind, has_fog))
     return light
+
+
+def _report_arnolds(inputs: LightAttributes, light: Light) -> None:
+    """What of a mesh light of Arnold's is read in another way than Arnold's."""
+    prim, code, report = inputs.prim, inputs.frames.first, inputs.report
+    report.note(inputs.path, "primvars:arnold:light", "the mesh is a light, beside what its material is")
+    values = (prim.GetAttribute(name).Get(code) for name in arnold_names_of(prim, "camera") if prim.HasAttribute(name))
+    if light.visibility.get("camera", True) and next(values, 0) != 1:
+        why = "Arnold's camera sees the mesh without its light; here it sees the light, too"
+        report.warn(inputs.path, "camera of a mesh light", why)
+    prefixes = arnold_names("light:")
+    others = {p.GetName() for p in prim.GetAuthoredProperties() if not p.GetName().startswith(prefixes)}
+    known = {name for parameter in ("camera", "aov", "shaders") for name in arnold_names_of(prim, parameter)}
+    report_others(prim, inputs.names | known | others, code, report, {}, _idle("MeshLight", False))
 
 
 def _in_arnolds_words(light: Light, inputs: LightAttributes) -> dict[str, object]:

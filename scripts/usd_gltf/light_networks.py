@@ -14,7 +14,7 @@ import numpy as np
 from pxr import Sdf, Usd, UsdShade
 
 from .evaluator import Evaluator
-from .light_attributes import LightAttributes, arnold_names
+from .light_attributes import LightAttributes, arnold_names_of
 from .network_images import NetworkImages
 from .quantities import Lost, Quantity
 from .report import Notebook
@@ -22,7 +22,6 @@ from .shader_network import Link, Network, literals
 from .stage import Frames, changes
 
 _PICTURED = ("RectLight", "DomeLight", "DomeLight_1")
-SHADERS = arnold_names("shaders")
 
 
 @dataclass
@@ -52,7 +51,7 @@ class LightNetworks:
         name, output = self._source(inputs)
         if output is None:
             return None
-        is_arnold = name in SHADERS
+        is_arnold = name in arnold_names_of(inputs.prim, "shaders")
         try:
             found = self._computed(str(inputs.path), UsdShade.Shader(output.GetPrim()), str(UsdShade.Output(output).GetBaseName()))
             found.is_tinted = not is_arnold
@@ -72,7 +71,8 @@ class LightNetworks:
 
     def _source(self, inputs: LightAttributes) -> tuple[str, Usd.Attribute | None]:
         """The attribute that says what the colour is, and the output of a shader that it reads."""
-        for name in SHADERS:
+        names = arnold_names_of(inputs.prim, "shaders")
+        for name in names:
             graph = graph_of(inputs.prim, name)
             inputs.known |= {name} if graph else set()
             output = connected(graph, "outputs:color") if graph else None

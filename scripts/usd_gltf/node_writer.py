@@ -42,6 +42,8 @@ class NodeWriter:
         self._meshes: dict[int, int] = {}
         self._still: dict[int, tuple[dict, dict | None]] = {}
         self._top: list[int] = []
+        self._placed_at: list[tuple[str, str]] = []
+        """The prototypes around what is written, by path, and where they are placed."""
 
     def write(self, prims: list[Prim], root: dict) -> None:
         """Write all prims under the node `root`."""
@@ -81,11 +83,14 @@ class NodeWriter:
             node["extras"]["usdCamera"] = extras
         if prim.fog is not None:
             node["extras"]["usdFog"] = prim.fog
+        if prim.filter is not None:
+            node["extras"]["usdLightFilter"] = prim.filter
+            self.report.count("light filters")
         node["extras"].update(self.linking.node(prim, chain))
         mesh = self.linking.mesh(prim, chain)
         if prim.light is not None:
             self.carriers.carry(prim.light, node, world, mesh)
-            node["extras"]["usdLux"].update(self.linking.light(prim))
+            node["extras"]["usdLux"].update(self._told(prim))
             others = self._others(prim, path, world, chain)
         elif mesh is not None:
             node["mesh"] = self._mesh(mesh)
@@ -113,8 +118,18 @@ class NodeWriter:
             node = {"name": prim.name, "extras": extras}
             nodes.append(self.document.node(node))
             self.carriers.carry(light, node, world, None)
-            node["extras"]["usdLux"].update(self.linking.light(prim))
+            node["extras"]["usdLux"].update(self._told(prim))
         return nodes
+
+    def _told(self, prim: Prim) -> dict:
+        """What the `usdLux` extras of a prim's light get of links and filters. A filter in the prototype that the light is in
+        is placed with it."""
+        told = self.linking.light(prim)
+        for path in prim.filters:
+            around = (place for place in reversed(self._placed_at) if path.startswith(f"{place[0]}/"))
+            prototype, at = next(around, ("", ""))
+            told.setdefault("filters", []).append(at + path[len(prototype) :])
+        return told
 
     def _mesh(self, mesh: MeshSource) -> int:
         if id(mesh) not in self._meshes:
@@ -143,7 +158,9 @@ class NodeWriter:
             else:
                 place = _place(*(part[position] for part in static[:3]))
                 index, outer = self._placed(name, prototype.name, place, None)
+            self._placed_at.append((prototype.path, name))
             self._fill(index, prototype, name, world @ matrix if prototype.lit else world, chain)
+            self._placed_at.pop()
             outer = self._seen(prototype, outer)
             if placements.seen is not None:
                 outer = hide(self.document, self.frames, outer, prototype.name, placements.seen)

@@ -19,10 +19,11 @@ from pxr import Gf, Usd, UsdGeom, UsdLux, UsdShade
 from . import curves, gprims
 from .arnold_placement import placement
 from .cameras import read_camera
+from .filter_kinds import RODS, Lost, carrier, kind_of, world_matrix
 from .fog import is_fog, read_fog
-from .instancers import Placements, read_placements
+from .instancers import Placements, Room, read_placements
 from .light_attributes import arnold_names
-from .light_filters import MULTIPLIER
+from .light_filters import carried
 from .light_inputs import SIZES, Light, light_type, read_light
 from .light_networks import LightNetworks
 from .mesh import MeshReader, MeshSource
@@ -66,8 +67,11 @@ class Prim:
     light: Light | None = None
     light_path: str = ""
     """The path of the light's own prim, whose collections link it."""
+    filters: tuple[str, ...] = ()
+    """The paths of the filters of its light that stand at nodes of their own."""
     camera: tuple[dict, dict] | None = None
     fog: dict | None = None
+    filter: dict | None = None
     instances: list[tuple[Prim, Placements]] = field(default_factory=list)
     children: list[Prim] = field(default_factory=list)
     seen: np.ndarray | None = None
@@ -78,7 +82,7 @@ class Prim:
     @property
     def is_empty(self) -> bool:
         """Whether nothing would be exported."""
-        return not (self.mesh or self.light or self.camera or self.fog or self.instances or self.children)
+        return not (self.mesh or self.light or self.camera or self.fog or self.filter or self.instances or self.children)
 
 
 class PrimTree:
@@ -105,6 +109,9 @@ class PrimTree:
         self._geometry_lights: dict[str, Usd.Prim] = {}
         self._lit_geometry: set[str] = set()
         self._has_fog = False
+        self._room = Room()
+        self._world_filters: dict[str, Prim] = {}
+        """Arnold's light filters, which stand by matrices of their own, by path."""
         for prim in Usd.PrimRange(stage.GetPseudoRoot(), PREDICATE):
             progress.total += 1
             self._has_fog |= is_fog(prim)
@@ -124,7 +131,7 @@ class PrimTree:
                 there = bool(self.stage.GetPrimAtPath(target))
                 why = f"its geometry {target} is {'not shown, or no mesh' if there else 'not there'}"
                 self.lights.warn(light.GetPath(), "GeometryLight emits nothing", why)
-        return [prim for prim in found if prim is not None]
+        return [prim for prim in found if prim is not None] + list(self._world_filters.values())
 
     def _compile(self, prim: Usd.Prim, purpose, predicate, above: Seen = _ALWAYS) -> Prim | None:
         """The tree below `prim`, or None if there is nothing in it to export. `above` says how what is above hides it."""
@@ -145,7 +152,7 @@ class PrimTree:
             purpose = imageable.ComputePurposeInfo(purpose) if purpose else imageable.ComputePurposeInfo()
             shown = str(purpose.purpose) in self.purposes
         compiled = Prim(str(path), prim.GetName(), np.eye(4))
-        if prim.IsA(UsdGeom.Xformable):
+        if prim.IsA(UsdGeom.Xformable) or kind_of(prim) in RODS:
             compiled.local, compiled.resets = self._local(prim)
             if not (np.abs(compiled.local) < 3e38).all():
                 self.report.warn(path, "transform that is not finite", "the prim and all below it are left out")
@@ -224,11 +231,12 @@ class PrimTree:
             compiled.mesh = self.meshes.read(prim)
             for name in filter(prim.HasAttribute, () if is_light else arnold_names("light")):
                 if prim.GetAttribute(name).Get(self.frames.first):
-                    why = "Arnold's mesh lights are not read; all that it emits is the glow of its material"
+                    why = f"a {kind} is no mesh light of Arnold's here; all that it emits is the glow of its material"
                     self.lights.warn(path, name, why)
             if compiled.mesh is not None and is_light:
                 compiled.light = self._light(light_prim, "MeshLight")
                 compiled.light_path = str(light_prim.GetPath())
+                compiled.filters = self._filters(light_prim, "MeshLight")
                 self._lit_geometry.add(str(path))
         elif prim.IsA(UsdGeom.Camera):
             is_hidden = seen.at is not None and not seen.at.any()
@@ -239,10 +247,11 @@ class PrimTree:
         elif light_type(prim) is not None:
             compiled.light = self._light(prim, light_type(prim))
             compiled.light_path = str(path)
+            compiled.filters = self._filters(prim, light_type(prim))
             if seen.at is not None and is_darkened(prim) and not seen.at.all():
                 compiled.light = self._vanishing(compiled.light, seen.at)
-        elif prim.IsA(UsdLux.LightFilter) or kind == MULTIPLIER:
-            pass  # a light that names it says what becomes of it
+        elif kind.endswith("LightFilter"):
+            compiled.filter = self._filter(prim)  # a light that names it says what becomes of it
         elif compiled.fog is None and (prim.IsA(UsdGeom.Gprim) or kind == "Volume"):
             self.report.warn(path, kind, "this kind of geometry has no carrier; it is left out")
         elif kind and not prim.GetPrimTypeInfo().GetSchemaType() and not _SETTINGS.fullmatch(kind):
@@ -257,6 +266,24 @@ class PrimTree:
             self._lights[key] = read_light(prim, kind, self.frames, self.networks, self._has_fog, self.lights)
         return self._lights[key]
 
+    def _filter(self, prim: Usd.Prim) -> dict | None:
+        """`extras.usdLightFilter`, if a filter can be carried."""
+        try:
+            return carrier(prim, self.frames.first, self.meters_per_unit)
+        except Lost:
+            return None
+
+    def _filters(self, light: Usd.Prim, kind: str) -> tuple[str, ...]:
+        """The paths of a light's filters that are carried; Arnold's are put at the top."""
+        found = carried(light, kind, self.frames.first)
+        for prim in found:
+            path = str(prim.GetPath())
+            if prim.GetTypeName() == "Shader" and path not in self._world_filters:
+                matrix = world_matrix(prim, self.frames)
+                local = np.eye(4) if matrix is None else matrix
+                self._world_filters[path] = Prim(path, prim.GetName(), local, filter=self._filter(prim))
+        return tuple(str(prim.GetPath()) for prim in found)
+
     def _vanishing(self, light: Light, seen: np.ndarray) -> Light | None:
         """The light, dark while it is hidden; None if it is never seen."""
         key = (light.path, seen.tobytes())
@@ -268,7 +295,7 @@ class PrimTree:
         """The prototypes of a PointInstancer, which is `seen` so, and where they are put."""
         path = str(prim.GetPath())
         targets = UsdGeom.PointInstancer(prim).GetPrototypesRel().GetForwardedTargets()
-        for number, groups in read_placements(prim, self.frames, self.report).items():
+        for number, groups in read_placements(prim, self.frames, self._room, self.report).items():
             if number < 0 or number >= len(targets):
                 why = f"protoIndices name {number}, but there are {len(targets)} prototypes; they are left out"
                 self.report.warn(path, "instances without a prototype", why)

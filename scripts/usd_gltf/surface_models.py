@@ -1,7 +1,7 @@
 """The surface models of MaterialX and Arnold in glTF's terms.
 
 standard_surface (Autodesk), OpenPBR, glTF's own and UsdPreviewSurface as MaterialX defines them, `surface_unlit`; Arnold's
-standard_surface, openpbr_surface, lambert, standard, and colours that stand as a surface. What MaterialX's own
+standard_surface, openpbr_surface, standard_hair, lambert, standard, and colours that stand as a surface. What MaterialX's own
 translation graphs (`libraries/bxdf/translation`) say of standard_surface and OpenPBR is followed, and what they leave out
 is said where it stands. The result has the names of `look_builder`.
 """
@@ -279,6 +279,37 @@ def _old_standard(inputs: Inputs) -> Read:
     return {**_lambert(inputs), "emissiveColor": _times(inputs, "emission", "emission_color", is_light=True)}
 
 
+def _hair(inputs: Inputs) -> Read:
+    """Arnold's `standard_hair` as a surface: the colour that many hairs have together, and the highlight of one."""
+    inputs.changed("base_color", "hair is drawn as a surface of the colour that it has as a whole, which light does not pass")
+    is_uneven = not _zero(inputs.get("roughness_anisotropic"))
+    across = inputs.get("roughness_azimuthal" if is_uneven else "roughness")
+    color = _times(inputs, "base", "base_color")
+    pigment = (inputs.get("melanin"), inputs.get("melanin_redness"), across)
+    color = _or(inputs, "melanin", color, lambda: inputs.canvas.multiply(color, inputs.canvas.apply(_pigmented, *pigment)))
+    diffuse = inputs.get("diffuse")
+    if not _zero(diffuse):
+        dull = inputs.get("diffuse_color").wide(3)
+        color = _or(inputs, "diffuse", color, lambda: inputs.canvas.mix(color, dull, diffuse))
+    return {
+        "diffuseColor": color, "metallic": _ZERO, "roughness": inputs.get("roughness"), "ior": inputs.get("ior"),
+        "specular": _ONE, "specularTint": inputs.get("specular_tint").wide(3), "opacity": _opacity(inputs, "opacity"),
+        "emissiveColor": _times(inputs, "emission", "emission_color", is_light=True),
+    }  # fmt: skip
+
+
+def _pigmented(melanin: np.ndarray, redness: np.ndarray, roughness: np.ndarray) -> np.ndarray:
+    """The colour of hair with melanin: what it absorbs (MaterialX's `deon_hair_absorption_from_melanin`), and the colour of
+    many hairs that absorb so (Chiang et al. 2016, "A Practical and Controllable Hair and Fur Model", section 4.2)."""
+    amount = -np.log(np.maximum(1.0 - melanin, 0.0001))
+    shape = (3, *(1,) * (np.ndim(amount) - 1))
+    brown, red = (np.reshape(absorbed, shape) for absorbed in ((0.419, 0.697, 1.37), (0.187, 0.4, 1.05)))
+    absorbed = amount * ((1.0 - redness) * brown + redness * red)
+    b = roughness
+    spread = 5.969 - 0.215 * b + 2.532 * b**2 - 10.73 * b**3 + 5.574 * b**4 + 0.245 * b**5
+    return np.exp(-np.sqrt(np.maximum(absorbed, 0.0)) * spread)
+
+
 def _color(inputs: Inputs) -> Read:
     """A colour that stands as a surface glows, whatever falls on it."""
     return {**_dark(), "emissiveColor": Quantity(inputs.get("").parts[:3]).wide(3)}
@@ -341,6 +372,14 @@ _OLD_LOST = dict.fromkeys(
 _OLD = {"Kd": 0.7, "Kd_color": (1.0,) * 3, "opacity": (1.0,) * 3, "emission": 0.0, "emission_color": (1.0,) * 3}
 _OLD |= dict.fromkeys(_OLD_LOST, 0.0)
 
+_HAIR = {
+    "base": 1.0, "base_color": (1.0,) * 3, "melanin": 1.0, "melanin_redness": 0.5, "melanin_randomize": 0.0, "roughness": 0.2,
+    "roughness_azimuthal": 0.2, "roughness_anisotropic": 0.0, "ior": 1.55, "diffuse": 0.0, "diffuse_color": (1.0,) * 3,
+    "specular_tint": (1.0,) * 3, "emission": 0.0, "emission_color": (1.0,) * 3, "opacity": (1.0,) * 3,
+}  # fmt: skip
+"""Arnold's, as its exporters write them out; `melanin` is that of NVIDIA's OmniHair, which has the same parameters."""
+_HAIR_LOST = {"melanin_randomize": "all hairs have the mean"}
+
 MODELS: dict[str, Model] = {
     "standard_surface": Model(
         _standard_surface, lost=_STANDARD_LOST, neutral={"coat_IOR": 1.5}, emission=("emission", "emission_color")
@@ -359,6 +398,7 @@ MODELS: dict[str, Model] = {
     "arnold:openpbr_surface": Model(
         _open_pbr, _ARNOLD_OPEN_PBR, _OPEN_PBR_LOST, {"coat_ior": 1.5}, ("emission_luminance", "emission_color")
     ),
+    "arnold:standard_hair": Model(_hair, _HAIR, _HAIR_LOST, emission=("emission", "emission_color")),
     "arnold:lambert": Model(_lambert, {"Kd": 0.8, "Kd_color": (1.0,) * 3, "opacity": (1.0,) * 3}),
     "arnold:standard": Model(_old_standard, _OLD, _OLD_LOST, emission=("emission", "emission_color")),
 }  # fmt: skip

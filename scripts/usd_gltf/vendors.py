@@ -54,6 +54,8 @@ def report_others(
         if name in known or name.startswith(_NOT_OURS):
             continue
         words = name.removeprefix("primvars:").removeprefix("inputs:").split(":")
+        if words[:2] == ["arnold", "light"] and len(words) == 3:
+            del words[1]  # of a mesh light
         if len(words) == 1 and name.startswith("primvars:") and prim.HasAttribute("faceVertexCounts"):
             continue  # a mesh's own primvar
         value = property_.Get(code) if isinstance(property_, Usd.Attribute) else property_.GetTargets()

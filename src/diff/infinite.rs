@@ -2,7 +2,7 @@
 
 use super::card::Kind;
 use super::light::{Light, Profile, Row};
-use super::profile::{add_texture, short};
+use super::profile::{add_texture, short, with_filters};
 use super::scene_side::kind;
 use crate::emitter::infinite_lights;
 use crate::light_tree::{LightLook, LightRow};
@@ -36,6 +36,9 @@ pub(super) fn find(scene: &Scene, pose: &Pose, frames: &[i32]) -> Vec<Infinite> 
         let way = ways.get(&light.node);
         let (moves, varies) = (way.is_some(), light.values.as_deref().is_some_and(Keys::varies));
         let profile = profile(scene, &light.kind);
+        let filters = scene.light_filters.of_light(row as u32);
+        let pattern = with_filters(profile.pattern, scene, pose, filters);
+        let profile = Profile { pattern, ..profile };
         let mut hasher = blake3::Hasher::new();
         hasher.update(&profile.pattern.to_le_bytes());
         hasher.update(&profile.half_angle_rad.unwrap_or(0.0).to_le_bytes());

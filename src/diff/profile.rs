@@ -4,6 +4,7 @@ use super::light::Profile;
 use crate::emitter::{Emitters, LightSource, MeshLight};
 use crate::math::directions::light_axes;
 use crate::scene::{IesProfile, Pixels, Pose, Scene, Shaping, Texture};
+use glam::Vec3;
 use rayon::prelude::*;
 
 /// Hashes of what the instances of a mesh light share. Each is computed once, however many instances
@@ -26,6 +27,15 @@ impl Profiles {
 
     /// The profile of a light that is not infinite, in a pose.
     pub fn of_light(&self, scene: &Scene, pose: &Pose, source: LightSource) -> Profile {
+        let filters = match source {
+            LightSource::Mesh { instance, .. } => scene.light_filters.of_instance(instance),
+            LightSource::Light(row) => scene.light_filters.of_light(row),
+        };
+        let profile = self.unfiltered(scene, pose, source);
+        Profile { pattern: with_filters(profile.pattern, scene, pose, filters), ..profile }
+    }
+
+    fn unfiltered(&self, scene: &Scene, pose: &Pose, source: LightSource) -> Profile {
         let (shaping, texture, node) = match source {
             LightSource::Mesh { instance, mesh_light } => {
                 let instance = &scene.instances[instance as usize];
@@ -67,6 +77,28 @@ impl Profiles {
     pub fn shape(&self, mesh_light: u32) -> u128 {
         self.shapes[mesh_light as usize]
     }
+}
+
+/// The hash of a pattern behind filters, which are rows of the scene's.
+pub(super) fn with_filters(pattern: u128, scene: &Scene, pose: &Pose, filters: &[u32]) -> u128 {
+    // A smaller step is rounding, metres.
+    const LEAST: f64 = 1e-4;
+    if filters.is_empty() {
+        return pattern;
+    }
+    let mut hasher = blake3::Hasher::new();
+    hasher.update(&pattern.to_le_bytes());
+    for &row in filters {
+        let filter = &scene.light_filters.all()[row as usize];
+        hasher.update(format!("{:?}", filter.kind).as_bytes());
+        let world = pose.world(filter.node);
+        let place = Vec3::from(world.translation).as_dvec3() + scene.origin;
+        let axes = world.matrix3.to_cols_array().map(f64::from);
+        for number in axes.into_iter().chain(place.to_array()) {
+            hasher.update(&((number / LEAST).round() as i64).to_le_bytes());
+        }
+    }
+    short(&hasher)
 }
 
 /// The hash of a light's axes in the world, but for what is rounding.

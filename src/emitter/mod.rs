@@ -8,6 +8,8 @@
 //! sampling density, so that multiple importance sampling can weigh both ways of finding light.
 //! [`InfiniteLight`]s, suns and domes, stay outside the tree.
 //!
+//! [`PosedFilters`] tell what of a light's light gets to a point; bounds and densities are without them.
+//!
 //! This room does not know the tree. Which emitter to sample is decided elsewhere.
 //!
 //! Differences of positions, angles off an axis and products of edges are in double precision. What is
@@ -16,6 +18,7 @@
 mod beam;
 mod bounding;
 mod dome;
+mod filters;
 mod infinite;
 mod mesh_light;
 mod picture;
@@ -29,6 +32,7 @@ mod textured;
 mod triangle;
 
 pub use bounding::LightOverflow;
+pub use filters::{PosedFilters, Source};
 pub use infinite::{InfiniteLight, InfiniteSample, Skies, infinite_lights};
 pub use mesh_light::MeshLight;
 pub use posed::{EmitterHit, LightSample, MeshPlace, PosedEmitters};

@@ -125,6 +125,8 @@ fn lights(needs: &Requirements, emitters: &Emitters) -> Vec<Feature> {
         Feature::new("forced lights", needs.forced)
             .with("sampled at every point beside what is picked"),
         Feature::new("lights hidden from some rays", needs.hidden),
+        Feature::new("lights with filters", needs.filtered_lights)
+            .with("weighed by the tree as if they had none"),
         Feature::new("light links", needs.light_links)
             .with("numbers of lights, in the tree file; surfaces that not all lights light pick by them")
             .taking(if emitters.link_sets().is_empty() { 0 } else { 4 * emitters.lights().len() }),

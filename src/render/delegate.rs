@@ -17,7 +17,7 @@ use super::plan::{Plan, PlanError};
 use super::rays::RayScene;
 use super::settings::RenderSettings;
 use super::surface::Surfaces;
-use crate::emitter::{Emitters, InfiniteLight, PosedEmitters, Skies};
+use crate::emitter::{Emitters, InfiniteLight, PosedEmitters, PosedFilters, Skies};
 use crate::light_tree::learned::Learned;
 use crate::light_tree::{LightTree, NoSuchFrame};
 use crate::math::random::{hash, stratified};
@@ -208,6 +208,8 @@ impl<'a> RenderDelegate<'a> {
         let tracers = self.geometry.for_poses(scene, times.poses());
         let fog = times.poses().par_iter().map(|pose| Fog::new(scene, pose, &self.camera));
         let fog: Vec<Option<Fog>> = fog.collect();
+        let filters = times.poses().iter().map(|pose| PosedFilters::new(scene, pose));
+        let filters: Vec<Option<PosedFilters>> = filters.collect();
         let integrator = |(view, camera): (usize, &CameraRays)| {
             let at = times.pose_of(view);
             let pose = &times.poses()[at];
@@ -221,6 +223,7 @@ impl<'a> RenderDelegate<'a> {
                 links,
                 camera: *camera,
                 cells: learned.map(|learned| learned.cells),
+                filters: filters[at].clone(),
                 fog: fog[at].clone(),
                 groups: self.plan.as_ref().ok().and_then(|plan| plan.groups.as_ref()),
                 found_by_reflection: match settings.mis {

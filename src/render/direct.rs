@@ -4,6 +4,7 @@ use super::path::{Integrator, PathScratch, TraceStats};
 use super::picker::{LightPick, PickScratch, Wanted};
 use super::rays::{Anchor, Caster, Hit, Transmitted};
 use super::vertex::{Inside, Vertex};
+use crate::emitter::Source;
 use crate::light_tree::{Picked, Splitting};
 use crate::math::color::{Rgb, luminance};
 use crate::math::random::hash;
@@ -146,7 +147,13 @@ impl Integrator<'_> {
             Picked::Beside(row) => {
                 let light = &self.infinite[row as usize];
                 let s = light.sample(normal, u)?;
-                let (direction, radiance, pdf) = (s.direction, s.radiance, s.pdf);
+                let (direction, pdf) = (s.direction, s.pdf);
+                let passes =
+                    self.filtered(Picked::Beside(row), point, Source::Direction(direction));
+                if passes == Rgb::ZERO {
+                    return None;
+                }
+                let radiance = s.radiance * passes;
                 let is_seen = light.visibility.reflections && by_reflection;
                 return Some(Incoming {
                     direction,
@@ -159,6 +166,10 @@ impl Integrator<'_> {
             }
         };
         let s = self.emitters.sample(emitter, point, u)?;
+        let passes = self.filtered(light, point, Source::Point(s.point));
+        if passes == Rgb::ZERO {
+            return None;
+        }
         let coverage = s.on_mesh.map_or(1.0, |place| {
             self.surfaces.coverage(place.instance, place.triangle, place.barycentric)
         });
@@ -169,7 +180,7 @@ impl Integrator<'_> {
         };
         Some(Incoming {
             direction: s.direction,
-            radiance: s.radiance * coverage,
+            radiance: s.radiance * passes * coverage,
             pdf: s.pdf,
             from: Some(from),
             is_seen: s.is_seen && by_reflection,

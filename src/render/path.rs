@@ -18,7 +18,9 @@ use super::rays::{Hit, HitSurface, Passed, Seen, Sender, Tracer};
 use super::settings::RenderSettings;
 use super::surface::Surfaces;
 use super::vertex::{Inside, Vertex};
-use crate::emitter::{EmitterHit, InfiniteLight, PosedEmitters};
+use crate::emitter::{
+    EmitterHit, EmitterPlace, InfiniteLight, PosedEmitters, PosedFilters, Source,
+};
 use crate::light_tree::learned::Cells;
 use crate::light_tree::{Cell, Picked, Receiver, Splitting};
 use crate::math::built_in;
@@ -52,6 +54,8 @@ pub struct Integrator<'a> {
     pub cells: Option<Cells<'a>>,
     /// Which lights light what, if not all light everything.
     pub links: Option<FrameLinks<'a>>,
+    /// What lights are filtered by, if any are.
+    pub filters: Option<PosedFilters<'a>>,
     /// What fills the space, if anything does.
     pub fog: Option<Fog>,
     /// Which light group each light is in, if that is asked for.
@@ -372,7 +376,10 @@ impl Integrator<'_> {
             let pdf = || self.emitters.pdf(&at, before.point);
             self.weight_of_hit(before, light, scratch, pdf)
         });
-        let arriving = throughput * (radiance * weight);
+        let filtered = before
+            .as_ref()
+            .map_or(Rgb::ONE, |before| self.filtered(light, before.point, Source::Point(at.point)));
+        let arriving = throughput * (radiance * filtered * weight);
         self.count_in_group(light, arriving, &mut scratch.by_group);
         arriving
     }
@@ -400,11 +407,32 @@ impl Integrator<'_> {
             let weight = before.as_ref().map_or(1.0, |before| {
                 self.weight_of_hit(before, picked, scratch, || light.pdf(before.normal, direction))
             });
-            let light = radiance * weight;
+            let filtered = before.as_ref().map_or(Rgb::ONE, |before| {
+                self.filtered(picked, before.point, Source::Direction(direction))
+            });
+            let light = radiance * filtered * weight;
             self.count_in_group(picked, throughput * light, &mut scratch.by_group);
             sum += light;
         }
         sum
+    }
+
+    /// The share of a light's light from a source that its filters let through to a point.
+    #[inline]
+    pub(super) fn filtered(&self, light: Picked, point: Vec3, source: Source) -> Rgb {
+        let Some(filters) = &self.filters else { return Rgb::ONE };
+        match light {
+            Picked::Emitter(emitter) => match self.emitters.emitters.place_of(emitter) {
+                EmitterPlace::Triangle { instance, .. } => {
+                    filters.of_instance(instance, point, source)
+                }
+                EmitterPlace::Light(row) => filters.of_light(row, point, source),
+            },
+            Picked::Beside(row) => {
+                let light = self.infinite[row as usize].light;
+                filters.of_light(light as u32, point, source)
+            }
+        }
     }
 
     /// Whether a ray finds a light that it meets: the eye's always, a reflected one if the light lights what the ray

@@ -14,6 +14,7 @@
 //! | [`lights`](Scene::lights) | lights that are not meshes: points, spots, spheres, suns, domes |
 //! | [`profiles`](Scene::profiles) | how the light of a luminaire was measured to depend on direction |
 //! | [`light_groups`](Scene::light_groups) | a name for the lights at a node and below |
+//! | [`light_filters`](Scene::light_filters) | what multiplies the light of some lights on its way |
 //! | [`linking`](Scene::linking) | what lights light, and what casts their shadows, where that is not everything |
 //! | [`medium`](Scene::medium) | the fog that fills it, or a box of it; one or none |
 //! | [`cameras`](Scene::cameras) | a view from a node |
@@ -29,6 +30,7 @@ mod deformation;
 mod ies_profile;
 mod lens;
 mod light;
+mod light_filter;
 mod linking;
 mod material;
 mod medium;
@@ -50,6 +52,7 @@ pub use deformation::{Deformation, FARTHEST_M, Shape, Skeleton, Skin, Target, is
 pub use ies_profile::{IesProfile, IesTable, LitCone, Pole};
 pub use lens::LensKeys;
 pub use light::{Light, LightKind, Shaping};
+pub use light_filter::{BlockerShape, FilterKind, LightFilter, LightFilters, Rod};
 pub use linking::{LinkRows, Linking, Links, Membership};
 pub use material::{AlphaMode, Coat, Material, Transmission, Volume};
 pub use medium::{FogBox, Medium};
@@ -95,6 +98,8 @@ pub struct Scene {
     pub profiles: Vec<IesProfile>,
     /// Light groups by node: of the lights at it, and of those below that have none of their own.
     pub light_groups: BTreeMap<u32, String>,
+    /// Which lights have which filters.
+    pub light_filters: LightFilters,
     /// Which lights light what, and what casts shadows from them.
     pub linking: Linking,
     /// The fog in it, if there is any.
@@ -122,7 +127,9 @@ impl Scene {
         let instances = self.instances.iter().map(|instance| instance.node);
         let lights = || (0..).zip(&self.lights).filter(|(_, light)| !light.kind.is_infinite());
         let fog = self.medium.iter().filter_map(|medium| Some(medium.region?.node));
-        let mut nodes = instances.chain(lights().map(|(_, light)| light.node)).chain(fog);
+        let filters = self.light_filters.all().iter().map(|filter| filter.node);
+        let placed = instances.chain(lights().map(|(_, light)| light.node));
+        let mut nodes = placed.chain(fog).chain(filters);
         nodes.all(|node| one.world(node) == other.world(node))
             && lights().all(|(row, _)| one.light_rgb(row) == other.light_rgb(row))
             && one.instance_rgb == other.instance_rgb

@@ -34,6 +34,8 @@ pub struct Requirements {
     pub forced: usize,
     /// Mesh lights, spheres and lights at infinity that some rays do not meet.
     pub hidden: usize,
+    /// Mesh lights and other lights with filters.
+    pub filtered_lights: usize,
     /// Mesh lights and other lights that do not light everything.
     pub light_links: usize,
     /// Those from which not everything casts shadows.
@@ -89,10 +91,12 @@ impl Requirements {
                 needs.hidden += usize::from(instance.visibility != Visibility::ALL);
             }
         }
+        let shines = |&row: &u32| scene.peak_rgb_of_instance(row).max_element() > 0.0;
+        let filters = &scene.light_filters;
+        needs.filtered_lights =
+            filters.filtered_instances().filter(shines).count() + filters.filtered_lights().count();
         let linking = &scene.linking;
-        let of_meshes = linking
-            .linked_instances()
-            .filter(|&(row, _)| scene.peak_rgb_of_instance(row).max_element() > 0.0);
+        let of_meshes = linking.linked_instances().filter(|(row, _)| shines(row));
         for (_, links) in of_meshes.chain(linking.linked_lights()) {
             needs.light_links += usize::from(links.light.is_some());
             needs.shadow_links += usize::from(links.shadow.is_some());

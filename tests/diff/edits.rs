@@ -5,8 +5,8 @@ use crate::street::{
 };
 use candelabra::diff::{Difference, Kind, Verb};
 use candelabra::scene::{
-    Channel, IesProfile, IesTable, Interpolation, Keys, LightKind, Pixels, Pole, Scene, Shaping,
-    Texture, TextureUse, Wrap,
+    BlockerShape, Channel, FilterKind, IesProfile, IesTable, Interpolation, Keys, LightFilter,
+    LightFilters, LightKind, Pixels, Pole, Scene, Shaping, Texture, TextureUse, Wrap,
 };
 use glam::{DQuat, Vec2, Vec3};
 use std::f64::consts::TAU;
@@ -423,5 +423,26 @@ fn what_sends_no_light_is_not_compared() {
         scene.materials[2].base_color = Vec3::X;
     }) {
         assert!(diff.is_same() && diff.changes.is_empty());
+    }
+}
+
+/// Trees do not know filters; scenes tell whether there is one, what it does and where it stands.
+#[test]
+fn a_light_with_another_filter_has_another_pattern_that_only_scenes_tell() {
+    let filtered = |row: usize, through: f32, at: &str| {
+        let mut scene = street();
+        let node = scene.nodes.iter().position(|node| node.path.ends_with(at)).unwrap() as u32;
+        let (shape, through) = (BlockerShape::Box, Vec3::splat(through));
+        let filters = vec![LightFilter { node, kind: FilterKind::Blocker { shape, through } }];
+        let lights = [(row as u32, 0)].into();
+        scene.light_filters = LightFilters::new(filters, vec![[0].into()], lights, [].into());
+        scene
+    };
+    for (row, name) in [(POINT, "point"), (SUN, "sun")] {
+        let half = || filtered(row, 0.5, "panel");
+        assert!(diff(half(), half()).changes.is_empty());
+        for other in [street(), filtered(row, 0.4, "panel"), filtered(row, 0.5, "bulb_1")] {
+            assert_eq!(aspects(&diff(half(), other), name), ["pattern"]);
+        }
     }
 }

@@ -1,5 +1,7 @@
 """Arnold's surfaces and the shaders that feed them."""
 
+import math
+
 import numpy as np
 import pytest
 from conftest import Gltf
@@ -229,3 +231,24 @@ def test_equal_meshes_in_instances_keep_their_colors(gltf, tmp_path):
     scene = gltf(one.format(0) + one.format(1))
     found = [scene.material(f"/I{i}/M")["pbrMetallicRoughness"]["baseColorFactor"][0] for i in (0, 1)]
     assert found == pytest.approx([0, 0.8])
+
+
+def test_hair_is_a_surface_of_the_colour_that_it_has_as_a_whole(export):
+    """Fair hair, dyed; its colour is Chiang's of what MaterialX says that melanin absorbs."""
+    inputs = "color3f inputs:base_color = (1, 0.5, 0.25)\n float inputs:melanin = 0.2\n float inputs:melanin_redness = 0.25\n"
+    inputs += "float inputs:roughness = 0.3\n float inputs:ior = 1.6\n color3f inputs:specular_tint = (1, 0.5, 0.5)"
+    result = export(arnold(inputs, name="standard_hair"))
+    assert result.code == 0 and result.warned("materials") == {"standard_hair base_color"}, result.said()
+    absorbed = -math.log(0.8) * (0.75 * np.array([0.419, 0.697, 1.37]) + 0.25 * np.array([0.187, 0.4, 1.05]))
+    spread = 5.969 - 0.215 * 0.3 + 2.532 * 0.09 - 10.73 * 0.027 + 5.574 * 0.0081 + 0.245 * 0.00243
+    scene = Gltf(result.path)
+    assert base(scene) == pytest.approx([1, 0.5, 0.25] * np.exp(-np.sqrt(absorbed) * spread), rel=1e-4)
+    extensions = scene.material("/M")["extensions"]
+    assert extensions["KHR_materials_ior"]["ior"] == pytest.approx(1.6)
+    assert extensions["KHR_materials_specular"]["specularColorFactor"] == pytest.approx([1, 0.5, 0.5])
+    assert scene.material("/M")["pbrMetallicRoughness"]["roughnessFactor"] == pytest.approx(0.3)
+
+
+def test_hair_that_is_dull_and_glows(gltf):
+    scene = gltf(arnold("float inputs:diffuse = 1\n color3f inputs:diffuse_color = (0.1, 0.2, 0.3)\n float inputs:emission = 2", name="standard_hair"))
+    assert base(scene) == pytest.approx([0.1, 0.2, 0.3]) and scene.nits("/M") == pytest.approx([2] * 3)

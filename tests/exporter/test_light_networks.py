@@ -206,8 +206,7 @@ def test_filters_multiply_one_another_and_over_time(gltf):
     (MULTIPLIER, "rel collection:filterLink:excludes = </L>", "linked to some geometry alone"),
     (MULTIPLIER, "uniform bool collection:filterLink:includeRoot = 0", "linked to some geometry alone"),
     ("PxrBarnLightFilter", "float inputs:width = 2", "PxrBarnLightFilter"),
-    ("PxrRodLightFilter", "", "PxrRodLightFilter"),
-    ("LightFilter", 'uniform token lightFilter:shaderId = "SomeFilter"', "LightFilter"),
+    ("LightFilter", 'uniform token lightFilter:shaderId = "SomeFilter"', "SomeFilter"),
 ])  # fmt: skip
 def test_other_filters_are_told_of_and_leave_the_light_as_it_is(export, kind, body, why):
     result = export(filtered((kind, body)))

@@ -280,7 +280,7 @@ def test_in_the_specular_workflow_the_specular_colour_is_what_is_reflected_strai
     assert specular["specularFactor"] == 1 and material["pbrMetallicRoughness"]["metallicFactor"] == 0
 
 
-@pytest.mark.parametrize("name", ["PxrSurface", "ND_surface", "ND_gone_surfaceshader", "arnold:standard_hair", ""])
+@pytest.mark.parametrize("name", ["PxrSurface", "ND_surface", "ND_gone_surfaceshader", "arnold:toon", ""])
 def test_unknown_shaders_are_reported_and_look_like_display_color(export, name):
     from conftest import Gltf
 

@@ -182,3 +182,57 @@ def test_a_normalized_light_is_posed_once_for_all_its_instances(gltf, monkeypatc
             found = scene.deformed_triangles(f"/{name}/M", time)
             cross = np.cross(found[:, 1] - found[:, 0], found[:, 2] - found[:, 0])
             assert nits[0] * np.linalg.norm(cross, axis=1).sum() / 2 == pytest.approx(1, rel=1e-4)
+
+
+# -- Arnold ------------------------------------------------------------------------------------------
+
+ARNOLD = "primvars:arnold:light"
+
+
+def arnolds(body="", kind="Mesh"):
+    camera = f"float {ARNOLD}:camera = 1"
+    text = f'def {kind} "M" (prepend apiSchemas = ["MaterialBindingAPI"]) {{ {QUAD} bool {ARNOLD} = 1\n {camera}\n {body} }}'
+    return text.replace(f" {camera}\n", "") if ":camera = 0" in body else text
+
+
+def test_a_mesh_light_of_arnolds_is_normalized_and_keeps_its_material(export):
+    """Its parameters are below `light`; those of the mesh are not the light's."""
+    dull = NEON.replace("color3f inputs:emissiveColor = (1, 0.5, 0)", "")
+    body = f"""float {ARNOLD}:intensity = 3\n float {ARNOLD}:exposure = 2\n color3f {ARNOLD}:color = (1, 0.5, 0)
+        string {ARNOLD}:aov = "key"\n int {ARNOLD}:samples = 4\n float {ARNOLD}:sss = 1\n float primvars:arnold:intensity = 50
+        float inputs:intensity = 70\n rel material:binding = </Neon>"""
+    result = export(dull + arnolds(body), "--strict")
+    assert result.code == 0, result.err
+    scene = Gltf(result.path)
+    assert scene.nits("/M") == pytest.approx([2, 1, 0])
+    assert scene.lux("/M")["group"] == "key"
+    assert scene.material("/M")["pbrMetallicRoughness"]["baseColorFactor"][:3] == pytest.approx([0.2, 0.3, 0.4])
+
+
+def test_a_mesh_light_of_arnolds_over_time_and_by_its_radiance(gltf):
+    body = f"bool {ARNOLD}:normalize = 0\n float {ARNOLD}:intensity.timeSamples = {{ 1: 1, 3: 5 }}"
+    values = gltf(SHOT + arnolds(body)).lux("/M")["values"]
+    assert values["rgb"][0] == [1] * 3 and max(row[0] for row in values["rgb"]) == 5
+
+
+@pytest.mark.parametrize(("body", "what"), [
+    (f"float {ARNOLD}:camera = 0", "camera of a mesh light"),
+    (f"float {ARNOLD}:specular = 0", "inputs:specular"),
+    (f"float {ARNOLD}:shadow_density = 0.5", "arnold attributes"),
+])  # fmt: skip
+def test_what_a_mesh_light_of_arnolds_loses_is_told(export, body, what):
+    assert what in export(arnolds(body)).warned("lights")
+
+
+def test_a_mesh_light_of_arnolds_is_filtered_by_its_own_graph(export):
+    box = 'token inputs:geometry_type = "box"\n matrix4d inputs:geometry_matrix = ((1, 0, 0, 0), (0, 1, 0, 0), (0, 0, 1, 0), (0, 0, 0, 1))'
+    shader = f'def Shader "F" {{ uniform token info:id = "arnold:light_blocker"\n {box}\n color3f outputs:out }}'
+    graph = f'\ndef ArnoldNodeGraph "G" {{ token outputs:filters:i1.connect = </G/F.outputs:out>\n {shader} }}'
+    result = export(arnolds(f'string {ARNOLD}:shaders = "/G"') + graph, "--strict")
+    assert result.code == 0, result.err
+    assert Gltf(result.path).lux("/M")["filters"] == ["/G/F"]
+
+
+def test_usds_own_mesh_light_counts_before_arnolds(gltf):
+    scene = gltf(f'def Mesh "M" (prepend apiSchemas = ["MeshLightAPI"]) {{ {QUAD} bool {ARNOLD} = 1\n float {ARNOLD}:intensity = 9 }}')
+    assert scene.nits("/M") == pytest.approx([1] * 3)

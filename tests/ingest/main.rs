@@ -5,6 +5,7 @@ mod coat;
 mod corpus;
 mod deforming;
 mod files;
+mod filters;
 mod fog;
 mod glass;
 mod gltf;

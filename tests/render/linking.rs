@@ -67,7 +67,7 @@ pub fn link(scene: &mut Scene, kept: &[Kept]) {
 const RADIANCE: f64 = 3.0;
 
 /// A light of some kind that shines down on the origin, and the irradiance that it gives there.
-fn lamp(stage: &mut Stage, kind: usize) -> (Lamp, f64) {
+pub fn lamp(stage: &mut Stage, kind: usize) -> (Lamp, f64) {
     let nits = Vec3::splat(RADIANCE as f32);
     let above = DVec3::new(0.0, 2.0, 0.0);
     let light = |stage: &Stage| Lamp::Light(stage.scene.lights.len() as u32 - 1);
@@ -104,10 +104,10 @@ fn lamp(stage: &mut Stage, kind: usize) -> (Lamp, f64) {
     }
 }
 
-const KINDS: usize = 6;
+pub const KINDS: usize = 6;
 
 /// Lamps cast no shadows, mesh lights from a row on included.
-fn hide_no_light(stage: &mut Stage, from: usize) {
+pub fn hide_no_light(stage: &mut Stage, from: usize) {
     stage.scene.instances.iter_mut().skip(from).for_each(|lamp| lamp.visibility.shadows = false);
     stage.scene.lights.iter_mut().for_each(|lamp| lamp.visibility.shadows = false);
 }

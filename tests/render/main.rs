@@ -9,6 +9,7 @@ mod deforming;
 mod determinism;
 mod extremes;
 mod far;
+mod filters;
 mod fitted;
 mod flames;
 mod fog;

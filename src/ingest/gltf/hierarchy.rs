@@ -2,6 +2,7 @@
 
 use super::animation::{self, Animated, Channels};
 use super::document::{Node as Row, Real, Transform, UsdFog, UsdLux, label, usd_path};
+use super::filters::FilterTable;
 use super::geometry::{Compiled, Meshes};
 use super::lights::{self, Placed};
 use super::links::LinkTable;
@@ -56,6 +57,7 @@ struct Walk<'a> {
     hanging: Vec<Hanging>,
     paths: PrimPaths,
     links: LinkTable,
+    filters: FilterTable,
     profiles: Profiles,
     /// For each node of the scene, whether neither it nor an ancestor ever scales unevenly.
     uniform: Vec<bool>,
@@ -75,6 +77,7 @@ pub(super) fn compile(source: &Source, output: &mut Output) -> Result<(), Fault>
         meshes: Meshes::new(source),
         paths: PrimPaths::with_room(source.document.nodes.len()),
         links: LinkTable::default(),
+        filters: FilterTable::default(),
         profiles: Profiles::default(),
         uniform: Vec::new(),
     };
@@ -110,6 +113,7 @@ pub(super) fn compile(source: &Source, output: &mut Output) -> Result<(), Fault>
         stack.extend(children.map(|child| open(child, Some(node), visible)));
     }
     walk.hang(output)?;
+    mem::take(&mut walk.filters).finish(output);
     walk.links.finish(output)
 }
 
@@ -181,7 +185,9 @@ impl Walk<'_> {
         if !had_fog && output.scene.medium.is_some() {
             self.links.set_medium(membership);
         }
+        self.filters.add(output, &row.extras, node, object)?;
         let lux = UsdLux::of(&row.extras, object)?;
+        let filters = self.filters.of_light(output, lux.as_ref(), object)?;
         let links = Links { membership, ..self.links.of_light(lux.as_ref(), object)? };
         if let Some(group) = lux.as_ref().and_then(|lux| lux.group.as_ref()) {
             let bytes = size_of::<(u32, String)>() + group.len();
@@ -199,6 +205,7 @@ impl Walk<'_> {
         let has_light = light.is_some();
         if has_light {
             self.links.add_light(output, links)?;
+            self.filters.add_light(output, filters)?;
         }
         output.scene.lights.extend(light);
         let forced = lux.as_ref().is_some_and(|lux| lux.force);
@@ -219,7 +226,8 @@ impl Walk<'_> {
         }
         let (lux, values) = (lux.as_ref(), values.as_ref());
         let visibility = lights::visibility(lux);
-        let placed = Placed { lux, shaping, values, forced, visibility, links, has_light, object };
+        let placed =
+            Placed { lux, shaping, values, forced, visibility, links, filters, has_light, object };
         let pose = self.poses.of(self.source, output, (number, row), mesh)?;
         let Some(instances) = instances else {
             if pose.is_skinned() && self.placed[number] != Some(node) {
@@ -271,6 +279,7 @@ impl Walk<'_> {
                 let sphere = lights::sphere(material, radius, node, placed);
                 let values = placed.copy_values(output)?;
                 self.links.add_light(output, placed.links)?;
+                self.filters.add_light(output, placed.filters)?;
                 output.scene.lights.push(Light { values, ..sphere });
                 return Ok(());
             }
@@ -306,6 +315,7 @@ impl Walk<'_> {
             let above = links.membership;
             let membership = self.links.of_primitive(output, primitive, above, placed.object)?;
             self.links.add_instance(output, Links { membership, ..links })?;
+            self.filters.add_instance(output, placed.filters)?;
             if let Some(hung) = hung {
                 let bytes = size_of::<Hanging>() as u64;
                 output.budget.take(bytes, || placed.object.to_string())?;

@@ -28,6 +28,8 @@ pub(super) struct Placed<'a> {
     pub visibility: Visibility,
     /// Of the node's light and of its geometry.
     pub links: Links,
+    /// The number of the filters of the node's light.
+    pub filters: Option<u32>,
     /// Whether a light has the node's path already.
     pub has_light: bool,
     pub object: &'a str,

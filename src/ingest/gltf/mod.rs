@@ -17,7 +17,7 @@
 //! | `posing` | skins and morph targets |
 //! | `materials`, `glossiness`, `coat`, `glass`, `textures` | surfaces |
 //! | `lights`, `fog`, `cameras`, `lenses`, `strengths`, `animation` | what they say |
-//! | `links` | which lights light what |
+//! | `links`, `filters` | which lights light what, and what is in their way |
 
 mod accessors;
 mod animation;
@@ -28,6 +28,7 @@ mod coat;
 mod container;
 mod document;
 mod extensions;
+mod filters;
 mod fog;
 mod forest;
 mod geometry;

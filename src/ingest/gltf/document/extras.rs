@@ -76,6 +76,8 @@ pub(in crate::ingest::gltf) struct UsdLux {
     #[serde(default)]
     pub visibility: UsdVisibility,
     pub group: Option<String>,
+    #[serde(default)]
+    pub filters: Vec<String>,
     #[serde(rename = "lightLink")]
     pub light_link: Option<u64>,
     #[serde(rename = "shadowLink")]
@@ -122,6 +124,26 @@ pub(in crate::ingest::gltf) struct UsdIes {
     pub angle_scale: Real,
     #[serde(default)]
     pub normalize: bool,
+}
+
+/// `extras.usdLightFilter`: what multiplies the light of lights that name the node.
+#[derive(Deserialize)]
+pub(in crate::ingest::gltf) struct UsdLightFilter {
+    #[serde(rename = "type")]
+    pub kind: String,
+    pub min: Option<[Real; 3]>,
+    pub max: Option<[Real; 3]>,
+    #[serde(default)]
+    pub radius: Real,
+    #[serde(default)]
+    pub edge: Real,
+    pub ramp: Option<Vec<[Real; 2]>>,
+    pub inside: Option<[Real; 3]>,
+    pub outside: Option<[Real; 3]>,
+    pub shape: Option<String>,
+    pub through: Option<[Real; 3]>,
+    pub near: Option<[Real; 2]>,
+    pub far: Option<[Real; 2]>,
 }
 
 /// `extras.usdLinks`: the link sets that geometry is in, or those that it is not in.
@@ -180,6 +202,15 @@ impl UsdLinks {
         object: &str,
     ) -> Result<Option<UsdLinks>, Fault> {
         member(extras, "usdLinks", object)
+    }
+}
+
+impl UsdLightFilter {
+    pub(in crate::ingest::gltf) fn of(
+        extras: &Extras,
+        object: &str,
+    ) -> Result<Option<UsdLightFilter>, Fault> {
+        member(extras, "usdLightFilter", object)
     }
 }
 

@@ -12,7 +12,8 @@ mod reference;
 
 pub(super) use beside::{Beside, Instancing, Target};
 pub(super) use extras::{
-    AssetUsd, UsdCamera, UsdFog, UsdIes, UsdLens, UsdLinks, UsdLux, UsdValues, usd_path,
+    AssetUsd, UsdCamera, UsdFog, UsdIes, UsdLens, UsdLightFilter, UsdLinks, UsdLux, UsdValues,
+    usd_path,
 };
 pub(super) use node::{Node, Transform};
 pub(super) use real::{Real, reals};
