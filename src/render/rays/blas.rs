@@ -1,6 +1,6 @@
 //! A set of triangles that a ray can search: the lower level of the kernel.
 
-use super::lanes::prefetch;
+use super::lanes::{prefetch, scattered};
 use super::triangles::{Block, Ray, ShearedRay, plane_distance};
 use super::wide_bvh::{AtLeaf, BoxRay, LEAF_SIZE, NONE, WideBvh};
 use crate::bounds::Aabb;
@@ -73,7 +73,8 @@ impl Blas {
             }
             Leaf { block, ids: of_lanes }
         });
-        let leaves = filled.collect();
+        let mut leaves = scattered(filled.len());
+        filled.collect_into_vec(&mut leaves);
         let bounds = boxes.iter().copied().reduce(|a, b| a.union(&b));
         Blas { tree, leaves, bounds }
     }

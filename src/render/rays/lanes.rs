@@ -2,7 +2,8 @@
 //!
 //! Programs are compiled for any x86-64, whose registers hold four `f32`; AVX2's hold eight. What is to run in the
 //! widest is written once, for any [`Lanes`], and compiled for each. Only the width differs: every result is rounded
-//! alike, so a picture does not depend on the machine.
+//! alike, so a picture does not depend on the machine. [`Lanes::times_plus`] alone is not: it is for searches that err on
+//! the safe side either way.
 
 #![allow(unsafe_code)]
 
@@ -19,10 +20,10 @@ pub trait Lanes: Copy {
     fn load(numbers: &[f32; LANES]) -> Self;
     /// The numbers.
     fn store(self) -> [f32; LANES];
-    /// Difference.
-    fn sub(self, other: Self) -> Self;
     /// Product.
     fn mul(self, other: Self) -> Self;
+    /// `self * factor + term`, rounded once where the processor can, else twice.
+    fn times_plus(self, factor: Self, term: Self) -> Self;
     /// The smaller of two; of `self` that is not a number, the other.
     fn min(self, other: Self) -> Self;
     /// The larger of two; of `self` that is not a number, the other.
@@ -42,11 +43,12 @@ pub trait WithLanes {
 pub fn with_widest(task: impl WithLanes) {
     #[cfg(target_arch = "x86_64")]
     {
-        #[target_feature(enable = "avx2")]
+        #[target_feature(enable = "avx2,fma")]
         fn with_avx2(task: impl WithLanes) {
             task.run::<avx2::One>();
         }
-        if std::arch::is_x86_feature_detected!("avx2") {
+        if std::arch::is_x86_feature_detected!("avx2") && std::arch::is_x86_feature_detected!("fma")
+        {
             // SAFETY: the processor has just said that it knows the instructions.
             return unsafe { with_avx2(task) };
         }
@@ -73,9 +75,31 @@ pub fn prefetch<T>(items: &[T], at: u32) {
     let _ = (items, at);
 }
 
+/// Room for items that are looked at in no order: in huge pages where the system has some, as a processor knows
+/// where few pages are.
+pub fn scattered<T>(capacity: usize) -> Vec<T> {
+    let items = Vec::<T>::with_capacity(capacity);
+    #[cfg(target_os = "linux")]
+    {
+        use rustix::mm::{Advice, madvise};
+        /// Bytes of a huge page.
+        const HUGE: usize = 1 << 21;
+        let start = items.as_ptr().cast::<u8>();
+        let before = start.align_offset(HUGE);
+        let whole = (items.capacity() * size_of::<T>()).saturating_sub(before) / HUGE * HUGE;
+        if whole > 0 {
+            let first = start.wrapping_add(before).cast_mut().cast();
+            // SAFETY: these pages are our own, and what they hold does not change. It is advice: systems that know
+            // no huge pages refuse it.
+            let _ = unsafe { madvise(first, whole, Advice::LinuxHugepage) };
+        }
+    }
+    items
+}
+
 /// Two registers of four.
 #[derive(Clone, Copy)]
-struct Two([Vec4; 2]);
+pub struct Two([Vec4; 2]);
 
 impl Two {
     #[inline(always)]
@@ -102,13 +126,13 @@ impl Lanes for Two {
     }
 
     #[inline(always)]
-    fn sub(self, other: Self) -> Self {
-        self.both(other, |a, b| a - b)
+    fn mul(self, other: Self) -> Self {
+        self.both(other, |a, b| a * b)
     }
 
     #[inline(always)]
-    fn mul(self, other: Self) -> Self {
-        self.both(other, |a, b| a * b)
+    fn times_plus(self, factor: Self, term: Self) -> Self {
+        self.mul(factor).both(term, |a, b| a + b)
     }
 
     #[inline(always)]
@@ -132,8 +156,8 @@ impl Lanes for Two {
 mod avx2 {
     use super::{LANES, Lanes};
     use std::arch::x86_64::{
-        __m256, _CMP_LE_OQ, _mm256_cmp_ps, _mm256_max_ps, _mm256_min_ps, _mm256_movemask_ps,
-        _mm256_mul_ps, _mm256_set1_ps, _mm256_sub_ps,
+        __m256, _CMP_LE_OQ, _mm256_cmp_ps, _mm256_fmadd_ps, _mm256_max_ps, _mm256_min_ps,
+        _mm256_movemask_ps, _mm256_mul_ps, _mm256_set1_ps,
     };
 
     /// One register of eight. Only [`with_widest`](super::with_widest) makes any.
@@ -158,13 +182,13 @@ mod avx2 {
         }
 
         #[inline(always)]
-        fn sub(self, other: Self) -> Self {
-            One(unsafe { _mm256_sub_ps(self.0, other.0) })
+        fn mul(self, other: Self) -> Self {
+            One(unsafe { _mm256_mul_ps(self.0, other.0) })
         }
 
         #[inline(always)]
-        fn mul(self, other: Self) -> Self {
-            One(unsafe { _mm256_mul_ps(self.0, other.0) })
+        fn times_plus(self, factor: Self, term: Self) -> Self {
+            One(unsafe { _mm256_fmadd_ps(self.0, factor.0, term.0) })
         }
 
         #[inline(always)]
@@ -198,7 +222,7 @@ mod tests {
         #[inline(always)]
         fn run<L: Lanes>(self) {
             let (a, b) = (L::load(&A), L::load(&B));
-            let results = [a.sub(b), a.mul(b), a.min(b), a.max(b), L::splat(0.1).mul(b)];
+            let results = [a.mul(b), a.min(b), a.max(b), L::splat(0.1).mul(b)];
             self.0.extend(results.iter().flat_map(|lanes| lanes.store().map(f32::to_bits)));
             self.0.push(a.at_most(b));
         }
