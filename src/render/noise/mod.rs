@@ -10,8 +10,8 @@
 //! Every command and test uses this measure. A renderer does not know the converged picture. It keeps two
 //! half pictures whose samples are scrambled independently; their difference tells the variance of their mean,
 //! however well the samples of each are stratified (Owen 1997; the noise of *one* such sequence cannot be told
-//! from its own samples). How far off that is in the logarithm depends on how large single samples are, which the
-//! brightest one tells ([`Halves`]). One pixel's number is rough, so [`Estimate`] pools those of
+//! from its own samples). How far off that is in the logarithm depends on how samples miss light ([`Halves`]).
+//! One pixel's number is rough, so [`Estimate`] pools those of
 //! neighbours. [`Allotment`] decides from it where samples are missing.
 //!
 //! Why the logarithm: an error relative to the luminance itself hangs on a few pixels in which light is
