@@ -89,7 +89,8 @@ fn filters_that_make_no_sense_are_refused() {
         (json!({"type": "decay", "far": "far"}), "usdLightFilter"),
         (json!({}), "usdLightFilter"),
     ] {
-        let error = with_filters(&[], std::slice::from_ref(&filter)).load().unwrap_err().to_string();
+        let error =
+            with_filters(&[], std::slice::from_ref(&filter)).load().unwrap_err().to_string();
         assert!(error.contains(words), "{filter}: {error}");
     }
     let many: Vec<&str> = vec!["/F0"; 65];
