@@ -245,8 +245,9 @@ mod tests {
         let one = Halves { counts: [1, 0], means: [2.0, 0.0], brightest: 2.0, ..Halves::default() };
         assert_eq!(one.squared_error(Grey(0.1)), 0.0);
         let counts = [8_u32, 24];
-        let halves = Halves { counts, means: [1.02, 0.98], brightest: 1.0, ..Halves::default() };
-        let variance = 0.04_f64.powi(2) * 8.0 * 24.0 / 32_f64.powi(2);
+        let halves =
+            Halves { counts, means: [1.0002, 0.9998], brightest: 1.0, ..Halves::default() };
+        let variance = 4e-4_f64.powi(2) * 8.0 * 24.0 / 32_f64.powi(2);
         let expected = variance / (halves.luminance() + 0.1).powi(2);
         assert!((halves.squared_error(Grey(0.1)) / expected - 1.0).abs() < 1e-3);
     }
