@@ -20,7 +20,7 @@ from pxr import Sdf, Usd, UsdShade
 from .filter_kinds import BLOCKER, DECAY, Lost, carrier, combines, is_hidden, is_linked, kind_of, varying
 from .light_attributes import LightAttributes, arnold_names_of
 from .light_networks import connected, graph_of
-from .stage import changes
+from .stage import Frames, changes
 
 MULTIPLIER = "PxrIntMultLightFilter"
 _NEUTRAL = {"diffuse": 1.0, "specular": 1.0, "saturation": 1.0, "colorSaturation": 1.0}
@@ -30,10 +30,36 @@ _MOST_IN_A_GRAPH = 64
 _PLACED_NOWHERE = ("DistantLight", "DomeLight", "DomeLight_1")
 
 
+class FilterReader:
+    """Reads the filters of a stage that stand at nodes, each once."""
+
+    def __init__(self, frames: Frames, meters_per_unit: float) -> None:
+        self.frames, self.meters_per_unit = frames, meters_per_unit
+        self._read: dict[Usd.Prim, dict | str] = {}
+
+    def carrier(self, prim: Usd.Prim) -> dict | str:
+        """`extras.usdLightFilter` of a filter, or why it has none."""
+        if prim not in self._read:
+            try:
+                self._read[prim] = carrier(prim, self.frames.first, self.meters_per_unit)
+            except Lost as lost:
+                self._read[prim] = str(lost)
+        return self._read[prim]
+
+    def of_light(self, prim: Usd.Prim, kind: str) -> dict | str:
+        """The same of a filter of a light of some kind."""
+        return _why_lost(prim, kind, self.frames.first) or self.carrier(prim)
+
+    def carried(self, light: Usd.Prim, kind: str) -> list[Usd.Prim]:
+        """The filters of a light that stand at nodes."""
+        others = (prim for prim in filters_of(light, self.frames.first) if prim.GetTypeName() != MULTIPLIER)
+        return [prim for prim in others if isinstance(self.of_light(prim, kind), dict)]
+
+
 class LightFilters:
     """The filters of one light."""
 
-    def __init__(self, inputs: LightAttributes, kind: str) -> None:
+    def __init__(self, inputs: LightAttributes, kind: str, reader: FilterReader) -> None:
         self.inputs = inputs
         self._multipliers: list[Usd.Prim] = []
         prim, lost = inputs.prim, []
@@ -44,11 +70,11 @@ class LightFilters:
             if found.GetTypeName() == MULTIPLIER and not _why_not(found):
                 self._multipliers.append(found)
                 continue
-            why = why_lost(found, kind, inputs.frames.first)
-            if why:
-                lost.append(f"{found.GetPath()} ({why})")
+            read = reader.of_light(found, kind)
+            if isinstance(read, str):
+                lost.append(f"{found.GetPath()} ({read})")
             else:
-                self._say(found)
+                self._say(found, read)
         if lost:
             why = f"they have no carrier; the light is exported without {', '.join(dict.fromkeys(lost))}"
             inputs.report.warn(inputs.path, "light filters", why)
@@ -56,13 +82,12 @@ class LightFilters:
             why = "it multiplies the light, and is put into it"
             inputs.report.note(inputs.path, f"light filter {found.GetPath()}", why)
 
-    def _say(self, found: Usd.Prim) -> None:
+    def _say(self, found: Usd.Prim, extras: dict) -> None:
         """Report what of a filter that is carried is not as the stage says."""
         report, path = self.inputs.report, found.GetPath()
         names = varying(found, self.inputs.frames)
         if names:
             report.warn(path, "animated light filter", f"of {', '.join(names)} the first frame's values are used")
-        extras = carrier(found, self.inputs.frames.first, 1.0)
         if any(start < end for start, end in (extras[name] for name in ("near", "far") if name in extras)):
             why = 'Arnold\'s user guide says that it fades by "a smooth ramp", but not by which; it is a smoothstep'
             report.warn(path, "ramp of a light_decay", why)
@@ -87,23 +112,14 @@ def filters_of(light: Usd.Prim, code: float) -> list[Usd.Prim]:
     return [prim for prim in found if not _is_idle(prim) and not is_hidden(prim, code)]
 
 
-def carried(light: Usd.Prim, kind: str, code: float) -> list[Usd.Prim]:
-    """Those that stand at nodes of their own."""
-    return [prim for prim in filters_of(light, code) if prim.GetTypeName() != MULTIPLIER and not why_lost(prim, kind, code)]
-
-
-def why_lost(found: Usd.Prim, kind: str, code: float) -> str:
-    """Why a filter of a light of some kind cannot be carried; empty if it can."""
+def _why_lost(found: Usd.Prim, kind: str, code: float) -> str:
+    """Why a light of some kind cannot have a filter, whatever that does; empty if it can."""
     if found.GetTypeName() == MULTIPLIER:
         return _why_not(found)
     if kind_of(found) == DECAY and kind in _PLACED_NOWHERE:
         return "its light is at no distance"
     if combines(found, code):
         return "it is combined with others"
-    try:
-        carrier(found, code, 1.0)
-    except Lost as lost:
-        return str(lost)
     return ""
 
 

@@ -20,7 +20,7 @@ from pxr import Sdf, Usd, UsdLux
 from . import light_groups, light_visibility
 from .arnold_placement import placement_names
 from .light_attributes import LightAttributes, arnold_names, arnold_names_of, is_arnolds_mesh_light, is_finite
-from .light_filters import LightFilters
+from .light_filters import FilterReader, LightFilters
 from .light_losses import report_losses
 from .light_networks import Computed, LightNetworks
 from .light_shaping import IesProfile, Shaping, read_shapings
@@ -117,7 +117,7 @@ def light_type(prim: Usd.Prim) -> str | None:
 
 
 def read_light(
-    prim: Usd.Prim, kind: str, frames: Frames, networks: LightNetworks, has_fog: bool, report: Notebook
+    prim: Usd.Prim, kind: str, frames: Frames, networks: LightNetworks, filters: FilterReader, has_fog: bool, report: Notebook
 ) -> Light:
     """Read all inputs of a light; bad numbers are reported and made harmless. `has_fog` says whether the stage has any."""
     inputs = LightAttributes(prim, frames, report)
@@ -125,7 +125,7 @@ def read_light(
     light = Light(
         path=str(prim.GetPath()),
         type=kind,
-        rgb=_emission(inputs, computed, LightFilters(inputs, kind)),
+        rgb=_emission(inputs, computed, LightFilters(inputs, kind, filters)),
         texels=None if computed is None else computed.texels,
         normalize=_track([bool(inputs.at("normalize", code)) for code in _codes(inputs, "normalize")]),
         # The schema names these without `inputs:`.

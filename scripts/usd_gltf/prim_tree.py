@@ -19,11 +19,11 @@ from pxr import Gf, Usd, UsdGeom, UsdLux, UsdShade
 from . import curves, gprims
 from .arnold_placement import placement
 from .cameras import read_camera
-from .filter_kinds import RODS, Lost, carrier, kind_of, world_matrix
+from .filter_kinds import RODS, kind_of, world_matrix
 from .fog import is_fog, read_fog
 from .instancers import Placements, Room, read_placements
 from .light_attributes import arnold_names
-from .light_filters import carried
+from .light_filters import FilterReader
 from .light_inputs import SIZES, Light, light_type, read_light
 from .light_networks import LightNetworks
 from .mesh import MeshReader, MeshSource
@@ -110,6 +110,7 @@ class PrimTree:
         self._lit_geometry: set[str] = set()
         self._has_fog = False
         self._room = Room()
+        self._filters = FilterReader(frames, meters_per_unit)
         self._world_filters: dict[str, Prim] = {}
         """Arnold's light filters, which stand by matrices of their own, by path."""
         for prim in Usd.PrimRange(stage.GetPseudoRoot(), PREDICATE):
@@ -236,7 +237,7 @@ class PrimTree:
             if compiled.mesh is not None and is_light:
                 compiled.light = self._light(light_prim, "MeshLight")
                 compiled.light_path = str(light_prim.GetPath())
-                compiled.filters = self._filters(light_prim, "MeshLight")
+                compiled.filters = self._placed(light_prim, "MeshLight")
                 self._lit_geometry.add(str(path))
         elif prim.IsA(UsdGeom.Camera):
             is_hidden = seen.at is not None and not seen.at.any()
@@ -247,7 +248,7 @@ class PrimTree:
         elif light_type(prim) is not None:
             compiled.light = self._light(prim, light_type(prim))
             compiled.light_path = str(path)
-            compiled.filters = self._filters(prim, light_type(prim))
+            compiled.filters = self._placed(prim, light_type(prim))
             if seen.at is not None and is_darkened(prim) and not seen.at.all():
                 compiled.light = self._vanishing(compiled.light, seen.at)
         elif kind.endswith("LightFilter"):
@@ -263,26 +264,24 @@ class PrimTree:
         source = prim.GetPrimInPrototype() if prim.IsInstanceProxy() else prim
         key = (str(source.GetPath()), kind)
         if key not in self._lights:
-            self._lights[key] = read_light(prim, kind, self.frames, self.networks, self._has_fog, self.lights)
+            self._lights[key] = read_light(prim, kind, self.frames, self.networks, self._filters, self._has_fog, self.lights)
         return self._lights[key]
 
     def _filter(self, prim: Usd.Prim) -> dict | None:
         """`extras.usdLightFilter`, if a filter can be carried."""
-        try:
-            return carrier(prim, self.frames.first, self.meters_per_unit)
-        except Lost:
-            return None
+        read = self._filters.carrier(prim)
+        return None if isinstance(read, str) else read
 
-    def _filters(self, light: Usd.Prim, kind: str) -> tuple[str, ...]:
-        """The paths of a light's filters that are carried; Arnold's are put at the top."""
-        found = carried(light, kind, self.frames.first)
-        for prim in found:
+    def _placed(self, light: Usd.Prim, kind: str) -> tuple[str, ...]:
+        """The paths of a light's filters that are carried, in the instance that it is in; Arnold's are put at the top."""
+        filters = self._filters.carried(light, kind)
+        for prim in filters:
             path = str(prim.GetPath())
             if prim.GetTypeName() == "Shader" and path not in self._world_filters:
                 matrix = world_matrix(prim, self.frames)
                 local = np.eye(4) if matrix is None else matrix
                 self._world_filters[path] = Prim(path, prim.GetName(), local, filter=self._filter(prim))
-        return tuple(str(prim.GetPath()) for prim in found)
+        return tuple(str(prim.GetPath()) for prim in filters)
 
     def _vanishing(self, light: Light, seen: np.ndarray) -> Light | None:
         """The light, dark while it is hidden; None if it is never seen."""

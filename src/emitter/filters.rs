@@ -17,7 +17,6 @@ pub enum Source {
 }
 
 /// The filters of a scene, placed by a pose.
-#[derive(Clone)]
 pub struct PosedFilters<'a> {
     filters: &'a LightFilters,
     /// World space to each filter's own; `None` where that is flattened to nothing.

@@ -223,7 +223,7 @@ impl<'a> RenderDelegate<'a> {
                 links,
                 camera: *camera,
                 cells: learned.map(|learned| learned.cells),
-                filters: filters[at].clone(),
+                filters: filters[at].as_ref(),
                 fog: fog[at].clone(),
                 groups: self.plan.as_ref().ok().and_then(|plan| plan.groups.as_ref()),
                 found_by_reflection: match settings.mis {

@@ -4,7 +4,7 @@ use super::path::{Integrator, PathScratch, TraceStats};
 use super::picker::{LightPick, PickScratch, Wanted};
 use super::rays::{Anchor, Caster, Hit, Transmitted};
 use super::vertex::{Inside, Vertex};
-use crate::emitter::Source;
+use crate::emitter::{EmitterPlace, Source};
 use crate::light_tree::{Picked, Splitting};
 use crate::math::color::{Rgb, luminance};
 use crate::math::random::hash;
@@ -44,6 +44,24 @@ impl Integrator<'_> {
             FoundByReflection::Nothing => false,
             FoundByReflection::Surfaces => self.tracer.may_meet_light(origin, direction),
             FoundByReflection::Everything => true,
+        }
+    }
+
+    /// The share of a light's light from a source that its filters let through to a point.
+    #[inline]
+    pub(super) fn filtered(&self, light: Picked, point: Vec3, source: Source) -> Rgb {
+        let Some(filters) = self.filters else { return Rgb::ONE };
+        match light {
+            Picked::Emitter(emitter) => match self.emitters.emitters.place_of(emitter) {
+                EmitterPlace::Triangle { instance, .. } => {
+                    filters.of_instance(instance, point, source)
+                }
+                EmitterPlace::Light(row) => filters.of_light(row, point, source),
+            },
+            Picked::Beside(row) => {
+                let light = self.infinite[row as usize].light;
+                filters.of_light(light as u32, point, source)
+            }
         }
     }
 

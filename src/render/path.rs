@@ -18,9 +18,7 @@ use super::rays::{Hit, HitSurface, Passed, Seen, Sender, Tracer};
 use super::settings::RenderSettings;
 use super::surface::Surfaces;
 use super::vertex::{Inside, Vertex};
-use crate::emitter::{
-    EmitterHit, EmitterPlace, InfiniteLight, PosedEmitters, PosedFilters, Source,
-};
+use crate::emitter::{EmitterHit, InfiniteLight, PosedEmitters, PosedFilters, Source};
 use crate::light_tree::learned::Cells;
 use crate::light_tree::{Cell, Picked, Receiver, Splitting};
 use crate::math::built_in;
@@ -55,7 +53,7 @@ pub struct Integrator<'a> {
     /// Which lights light what, if not all light everything.
     pub links: Option<FrameLinks<'a>>,
     /// What lights are filtered by, if any are.
-    pub filters: Option<PosedFilters<'a>>,
+    pub filters: Option<&'a PosedFilters<'a>>,
     /// What fills the space, if anything does.
     pub fog: Option<Fog>,
     /// Which light group each light is in, if that is asked for.
@@ -415,24 +413,6 @@ impl Integrator<'_> {
             sum += light;
         }
         sum
-    }
-
-    /// The share of a light's light from a source that its filters let through to a point.
-    #[inline]
-    pub(super) fn filtered(&self, light: Picked, point: Vec3, source: Source) -> Rgb {
-        let Some(filters) = &self.filters else { return Rgb::ONE };
-        match light {
-            Picked::Emitter(emitter) => match self.emitters.emitters.place_of(emitter) {
-                EmitterPlace::Triangle { instance, .. } => {
-                    filters.of_instance(instance, point, source)
-                }
-                EmitterPlace::Light(row) => filters.of_light(row, point, source),
-            },
-            Picked::Beside(row) => {
-                let light = self.infinite[row as usize].light;
-                filters.of_light(light as u32, point, source)
-            }
-        }
     }
 
     /// Whether a ray finds a light that it meets: the eye's always, a reflected one if the light lights what the ray

@@ -174,7 +174,8 @@ fn findings(
 ) -> Findings {
     let error = |of: &dyn Fn(&Pixel) -> f64| {
         let own = |(pixel, share): &(Pixel, f64)| {
-            // Small errors are relative, large ones are not as large.
+            // As halves that are so far apart tell it: picks may be farther apart than samples of a pixel ever are, so
+            // the brightest of those says nothing here.
             let [whole, off] = [pixel.halves.luminance(), of(pixel).sqrt()];
             let [above, below] =
                 [off, -off].map(|off| sketch.grey().squared_error(whole + off, whole));

@@ -206,8 +206,8 @@ mod tests {
     use super::*;
     use crate::math::random::hash;
 
-    /// Of pixels in which a sample meets a lamp with a chance of one in so many, beside light that all samples have: the error
-    /// that is told, over the true one.
+    /// The error that is told over the true one, of pixels of which so many samples are expected to meet a lamp, each by
+    /// chance; all samples have the light `beside`, a pixel has 1 of the lamp's in the mean.
     fn told_over_true(samples: u32, hits: f64, beside: f64) -> f64 {
         const PIXELS: u32 = 40_000;
         let grey = Grey(0.1);

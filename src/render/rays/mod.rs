@@ -28,6 +28,7 @@
 mod anchor;
 mod binary_bvh;
 mod blas;
+mod cover;
 mod lanes;
 mod meeting;
 mod placing;

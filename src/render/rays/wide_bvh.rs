@@ -8,6 +8,7 @@
 
 use super::binary_bvh::{self, BinaryNode};
 use super::blas::LARGEST_COORDINATE;
+use super::cover::{Costs, half_area};
 use super::lanes::{LANES, Lanes, WithLanes, prefetch, scattered, with_widest};
 use crate::bounds::Aabb;
 use glam::Vec3;
@@ -18,8 +19,6 @@ pub const LEAF_SIZE: usize = 4;
 const LEAF: u32 = 1 << 31;
 /// No child, no primitive.
 pub const NONE: u32 = u32::MAX;
-/// What a leaf costs, where a node costs 1.
-const LEAF_COST: f32 = 1.5;
 /// Stack entries that most walks clear, 384 bytes: enough for a tree 6 nodes deep.
 const SHALLOW: usize = 48;
 /// Stack entries kept out of the heap: enough for a tree 22 nodes deep.
@@ -258,65 +257,6 @@ impl Node {
     }
 }
 
-/// Half the surface of a node's box.
-fn half_area(node: &BinaryNode) -> f32 {
-    let size = node.bounds.extent();
-    size.x * size.y + size.y * size.z + size.z * size.x
-}
-
-/// For each binary node, what it costs to cover it with at most so many children of a wide node, less one, by the
-/// surface area heuristic (Ylitie, Karras and Laine 2017, "Efficient Incoherent Ray Traversal on GPUs Through
-/// Compressed Wide BVHs").
-struct Costs(Vec<[f32; LANES - 1]>);
-
-impl Costs {
-    fn of(binary: &[BinaryNode], leaf_size: u32) -> Costs {
-        let mut costs = Costs(vec![[0.0; LANES - 1]; binary.len()]);
-        // Children stand behind their parents.
-        for (number, node) in binary.iter().enumerate().rev() {
-            let area = half_area(node);
-            let mut least = if node.count <= leaf_size {
-                area * LEAF_COST
-            } else {
-                area + costs.divided(node, LANES).0
-            };
-            for slots in 1..LANES {
-                if slots > 1 && node.count > 1 {
-                    least = least.min(costs.divided(node, slots).0);
-                }
-                costs.0[number][slots - 1] = least;
-            }
-        }
-        costs
-    }
-
-    /// The least cost of the two children of a node in so many slots, and how many of those the first gets.
-    fn divided(&self, node: &BinaryNode, slots: usize) -> (f32, usize) {
-        let [a, b] = [0, 1].map(|side| &self.0[node.first as usize + side]);
-        let all = (1..slots).map(|first| (a[first - 1] + b[slots - first - 1], first));
-        all.fold((f32::INFINITY, 1), |best, next| if next.0 < best.0 { next } else { best })
-    }
-
-    /// Finds what covers the children of a node with so many slots.
-    fn cover_children(&self, binary: &[BinaryNode], top: usize, slots: usize, to: &mut Vec<usize>) {
-        let node = &binary[top];
-        let (_, first) = self.divided(node, slots);
-        self.cover(binary, node.first as usize, first, to);
-        self.cover(binary, node.first as usize + 1, slots - first, to);
-    }
-
-    fn cover(&self, binary: &[BinaryNode], top: usize, slots: usize, to: &mut Vec<usize>) {
-        let costs = &self.0[top];
-        let needed =
-            (1..slots).find(|&fewer| costs[fewer - 1] <= costs[slots - 1]).unwrap_or(slots);
-        if needed == 1 {
-            to.push(top);
-        } else {
-            self.cover_children(binary, top, needed, to);
-        }
-    }
-}
-
 /// From the binary tree to the wide one.
 struct Collapse<'a> {
     binary: &'a [BinaryNode],
@@ -365,16 +305,15 @@ impl Collapse<'_> {
         (collapse.wide, collapse.leaves)
     }
 
-    /// Up to eight descendants that cover `top`: those with which its subtree costs least, the largest first.
+    /// Up to eight descendants that cover `top`, the largest first.
     fn children_of(&self, top: usize) -> Vec<usize> {
-        let mut chosen = Vec::with_capacity(LANES);
-        if self.is_leaf(top) {
-            chosen.push(top);
-        } else {
-            self.costs.cover_children(self.binary, top, LANES, &mut chosen);
-        }
-        chosen.sort_by(|&a, &b| half_area(&self.binary[b]).total_cmp(&half_area(&self.binary[a])));
-        chosen
+        let mut children = match self.is_leaf(top) {
+            true => vec![top],
+            false => self.costs.children_of(self.binary, top),
+        };
+        let area = |&child: &usize| half_area(&self.binary[child]);
+        children.sort_by(|a, b| area(b).total_cmp(&area(a)));
+        children
     }
 
     fn is_leaf(&self, node: usize) -> bool {
