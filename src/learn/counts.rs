@@ -1,6 +1,6 @@
 //! Counts of what is seen, by cell and lane.
 
-use super::pool::{Known, Tally};
+use super::pool::{Known, Lane, Tally};
 use crate::emitter::InfiniteLight;
 use crate::light_tree::learned::BESIDE;
 use crate::light_tree::{Cell, FrameTree, Front, FrontGroup, Picked, Receiver, WIDTH};
@@ -110,6 +110,17 @@ impl Counts {
         tallies
     }
 
+    /// The lanes of a cell that are not looked into.
+    pub fn last_lanes(&self, cell: usize) -> Vec<Lane> {
+        let of_row = |row: &FrontGroup| {
+            let lane =
+                |lane: usize| Lane { group: row.group, lane, importance: row.importances[lane] };
+            let last = (0..WIDTH).filter(|&lane| row.inner[lane].is_none());
+            last.map(lane).collect::<Vec<_>>()
+        };
+        self.fronts[cell].groups.iter().flat_map(of_row).collect()
+    }
+
     /// The share of the light that is hidden in a cell, by importance, after what is known was summed up.
     pub fn hidden_in(&self, cell: usize, known: &[Known]) -> f64 {
         // The root stands first. What is below it is counted there.
@@ -117,9 +128,9 @@ impl Counts {
         let rows = self.fronts[cell].groups.iter().zip(known).enumerate();
         let lanes = rows
             .filter(|(at, (row, _))| tops(*at, row))
-            .flat_map(|(_, (row, known))| row.importances.into_iter().zip(known.shares));
+            .flat_map(|(_, (row, known))| row.importances.into_iter().zip(known.lanes));
         let [sum, seen] = lanes.fold([0.0; 2], |[sum, seen], (importance, share)| {
-            [sum + importance, seen + importance * share]
+            [sum + importance, seen + importance * share.seen]
         });
         if sum > 0.0 { 1.0 - seen / sum } else { 0.0 }
     }
@@ -132,8 +143,10 @@ impl Counts {
                 if let Some(inner) = row.inner[lane] {
                     let importances = &groups[inner].importances;
                     let sum: f64 = importances.iter().sum();
-                    let seen = known[inner].shares.iter().zip(importances).map(|(a, b)| a * b);
-                    known[at].shares[lane] = if sum > 0.0 { seen.sum::<f64>() / sum } else { 1.0 };
+                    let lanes = known[inner].lanes.iter().zip(importances);
+                    let seen = lanes.map(|(lane, importance)| lane.seen * importance);
+                    known[at].lanes[lane].seen =
+                        if sum > 0.0 { seen.sum::<f64>() / sum } else { 1.0 };
                 }
             }
         }

@@ -13,7 +13,6 @@ mod counts;
 mod pool;
 
 use crate::light_tree::learned::{Cells, Coordinates, Table, coordinates, divide};
-use crate::light_tree::veil::encode;
 use crate::light_tree::{LightTree, NoSuchFrame, Picked, Receiver, Splitting, Veil};
 use crate::math::random::hash;
 use crate::render::RenderDelegate;
@@ -22,7 +21,7 @@ use crate::render::picker::{PickScratch, Wanted};
 use crate::render::vertex::Vertex;
 use counts::Counts;
 use glam::{Vec2, Vec3};
-use pool::{Known, pool};
+use pool::{Known, Pool, Share};
 use rayon::prelude::*;
 use std::sync::{Mutex, PoisonError};
 
@@ -151,19 +150,16 @@ pub fn learn<E>(
 /// The veils that counts give, and of each cell the share of the light that is hidden, in parts of 255.
 fn rows(counts: &Counts, cells: usize) -> (Vec<Veil>, Vec<u8>) {
     let found: Vec<Mutex<(Vec<Veil>, u8)>> = (0..cells).map(|_| Mutex::default()).collect();
-    pool(
-        (0..cells).into_par_iter().map(|cell| counts.tallies(cell)).collect(),
-        &|cell, mut known| {
-            counts.sum_up(cell, &mut known);
-            let veil = |known: &Known| {
-                let weights = known.shares.map(|share| encode(share.sqrt()));
-                Veil { group: known.group, weights }
-            };
-            let rows = known.iter().map(veil).collect();
-            let hidden = (255.0 * counts.hidden_in(cell, &known)).round() as u8;
-            *found[cell].lock().unwrap_or_else(PoisonError::into_inner) = (rows, hidden);
-        },
-    );
+    let pool = Pool::new((0..cells).into_par_iter().map(|cell| counts.tallies(cell)).collect());
+    let rays_above = pool.rays_above(|cell| counts.last_lanes(cell));
+    pool.for_each_cell(rays_above, &|cell, mut known| {
+        counts.sum_up(cell, &mut known);
+        let veil =
+            |known: &Known| Veil { group: known.group, weights: known.lanes.map(Share::weight) };
+        let rows = known.iter().map(veil).collect();
+        let hidden = (255.0 * counts.hidden_in(cell, &known)).round() as u8;
+        *found[cell].lock().unwrap_or_else(PoisonError::into_inner) = (rows, hidden);
+    });
     let found =
         found.into_iter().map(|cell| cell.into_inner().unwrap_or_else(PoisonError::into_inner));
     let (rows, hidden) = found.unzip();

@@ -1,7 +1,7 @@
 //! A set of triangles that a ray can search: the lower level of the kernel.
 
 use super::lanes::{prefetch, scattered};
-use super::triangles::{Block, Ray, ShearedRay, plane_distance};
+use super::triangles::{Block, OfBlock, Ray, ShearedRay, plane_distance};
 use super::wide_bvh::{AtLeaf, BoxRay, LEAF_SIZE, NONE, WideBvh};
 use crate::bounds::Aabb;
 use glam::{DVec3, Vec3};
@@ -37,18 +37,18 @@ struct Leaf {
 
 /// Where a ray meets a triangle of a [`Blas`], in its space.
 #[derive(Clone, Copy, Debug)]
-pub struct BlasHit {
+pub struct BlasHit<'a> {
     /// In lengths of the ray's direction.
     pub t: f64,
     /// Which triangle.
     pub id: TriangleId,
     /// Its corners.
-    pub corners: [DVec3; 3],
+    pub triangle: OfBlock<'a>,
 }
 
-impl BlasHit {
+impl<'a> BlasHit<'a> {
     /// The same on an instance of the set.
-    pub fn of(&self, instance: u32) -> BlasHit {
+    pub fn of(&self, instance: u32) -> BlasHit<'a> {
         BlasHit { id: TriangleId { instance, ..self.id }, ..*self }
     }
 }
@@ -87,11 +87,11 @@ impl Blas {
     /// Calls `met` with the triangles that the ray meets at a distance in `(0, tmax)`, near ones
     /// roughly first if `ORDERED`. It returns the new `tmax`; a negative one ends the search.
     #[inline]
-    pub fn visit<const ORDERED: bool>(
-        &self,
+    pub fn visit<'a, const ORDERED: bool>(
+        &'a self,
         ray: &Ray,
         tmax: f64,
-        met: impl FnMut(&BlasHit) -> f64,
+        met: impl FnMut(&BlasHit<'a>) -> f64,
     ) {
         let (origin, direction) = (ray.origin.as_vec3(), ray.direction.as_vec3());
         let (sheared, bound) = (ShearedRay::new(origin, direction), search_limit(tmax));
@@ -101,9 +101,9 @@ impl Blas {
 }
 
 /// A ray among the triangles of a set.
-struct Search<'a, F> {
+struct Search<'a, 'r, F> {
     set: &'a Blas,
-    ray: &'a Ray,
+    ray: &'r Ray,
     sheared: ShearedRay,
     tmax: f64,
     /// What lies before `tmax` is searched with this.
@@ -111,7 +111,7 @@ struct Search<'a, F> {
     met: F,
 }
 
-impl<F: FnMut(&BlasHit) -> f64> AtLeaf for Search<'_, F> {
+impl<'a, F: FnMut(&BlasHit<'a>) -> f64> AtLeaf for Search<'a, '_, F> {
     #[inline(always)]
     fn visit(&mut self, leaf: u32) -> f32 {
         let Leaf { block, ids } = &self.set.leaves[leaf as usize];
@@ -119,12 +119,12 @@ impl<F: FnMut(&BlasHit) -> f64> AtLeaf for Search<'_, F> {
         while lanes != 0 {
             let lane = lanes.trailing_zeros() as usize % LEAF_SIZE;
             lanes &= lanes - 1;
-            let corners = block.get(lane);
-            let Some(t) = plane_distance(self.ray, corners) else { continue };
+            let Some(t) = plane_distance(self.ray, block.get(lane)) else { continue };
             if !(t > 0.0 && t < self.tmax) {
                 continue;
             }
-            self.tmax = (self.met)(&BlasHit { t, id: ids[lane], corners });
+            self.tmax =
+                (self.met)(&BlasHit { t, id: ids[lane], triangle: OfBlock { block, lane } });
             if self.tmax < 0.0 {
                 return -1.0;
             }

@@ -43,11 +43,16 @@ pub trait WithLanes {
 pub fn with_widest(task: impl WithLanes) {
     #[cfg(target_arch = "x86_64")]
     {
-        #[target_feature(enable = "avx2,fma")]
+        #[target_feature(enable = "avx2,fma,bmi1,lzcnt,popcnt")]
         fn with_avx2(task: impl WithLanes) {
             task.run::<avx2::One>();
         }
-        if std::arch::is_x86_feature_detected!("avx2") && std::arch::is_x86_feature_detected!("fma")
+        // Processors that have the first have all others, but a virtual machine may hide some.
+        if std::arch::is_x86_feature_detected!("avx2")
+            && std::arch::is_x86_feature_detected!("fma")
+            && std::arch::is_x86_feature_detected!("bmi1")
+            && std::arch::is_x86_feature_detected!("lzcnt")
+            && std::arch::is_x86_feature_detected!("popcnt")
         {
             // SAFETY: the processor has just said that it knows the instructions.
             return unsafe { with_avx2(task) };

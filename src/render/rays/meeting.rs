@@ -4,7 +4,7 @@ use super::anchor::Anchor;
 use super::blas::{BlasHit, TriangleId};
 use super::prim::Prim;
 use super::sphere::Sphere;
-use super::triangles::{Ray, barycentric};
+use super::triangles::{OfBlock, Ray, barycentric};
 use glam::{DAffine3, DVec3, Vec2};
 
 /// Relative error of a distance found in double precision, with room for what a scene may do to it.
@@ -67,7 +67,7 @@ pub(super) enum On<'a> {
         /// Its name.
         id: TriangleId,
         /// Its corners, in the space of its set.
-        corners: [DVec3; 3],
+        triangle: OfBlock<'a>,
         /// That space; `None` is the world's.
         space: Option<&'a Space>,
     },
@@ -94,8 +94,9 @@ impl Space {
 }
 
 impl<'a> Meeting<'a> {
-    pub fn with_triangle(hit: &BlasHit, space: Option<&'a Space>) -> Meeting<'a> {
-        Meeting { t: hit.t, on: On::Triangle { id: hit.id, corners: hit.corners, space } }
+    #[inline]
+    pub fn with_triangle(hit: &BlasHit<'a>, space: Option<&'a Space>) -> Meeting<'a> {
+        Meeting { t: hit.t, on: On::Triangle { id: hit.id, triangle: hit.triangle, space } }
     }
 
     /// The number of the triangle in its mesh.
@@ -109,7 +110,8 @@ impl<'a> Meeting<'a> {
     /// Normal of the surface's front in world space, of any length.
     fn normal(&self, ray: &Ray, prim: &Prim) -> DVec3 {
         match &self.on {
-            On::Triangle { corners: [a, b, c], space, .. } => {
+            On::Triangle { triangle, space, .. } => {
+                let [a, b, c] = triangle.corners();
                 let across = (b - a).cross(c - a);
                 match space {
                     // Normals go by the transpose of the inverse, which keeps the front's side.
@@ -138,7 +140,9 @@ impl<'a> Meeting<'a> {
     /// The hit in full.
     pub fn hit(&self, ray: &Ray, prim: &Prim) -> Hit {
         match &self.on {
-            On::Triangle { id, corners, space } => self.triangle_hit(ray, prim, id, corners, space),
+            On::Triangle { id, triangle, space } => {
+                self.triangle_hit(ray, prim, id, triangle.corners(), space)
+            }
             On::Sphere(sphere) => self.sphere_hit(ray, sphere),
         }
     }
@@ -148,12 +152,12 @@ impl<'a> Meeting<'a> {
         ray: &Ray,
         prim: &Prim,
         id: &TriangleId,
-        corners: &[DVec3; 3],
+        corners: [DVec3; 3],
         space: &Option<&Space>,
     ) -> Hit {
         let corners = match space {
             Some(space) => corners.map(|corner| space.to_world.transform_point3(corner)),
-            None => *corners,
+            None => corners,
         };
         let [a, b, c] = corners;
         let across = (b - a).cross(c - a).normalize_or_zero().as_vec3();

@@ -59,8 +59,9 @@ pub struct SeenPane {
 impl SeenPane {
     /// `None` if it is no triangle.
     pub(super) fn of(meeting: &Meeting, ray: &Ray, prim: &Prim, is_met: bool) -> Option<SeenPane> {
-        let On::Triangle { corners, .. } = meeting.on else { return None };
+        let On::Triangle { triangle, .. } = meeting.on else { return None };
         let (hit, is_front) = (meeting.hit(ray, prim), meeting.is_front(ray, prim));
+        let corners = triangle.corners();
         Some(SeenPane { hit, tint: Rgb::ONE, t: meeting.t, is_met, is_front, corners })
     }
 
@@ -150,7 +151,8 @@ pub struct Seen {
 pub(super) struct Sight<'a> {
     ray: &'a Ray,
     sender: Sender,
-    tmax: f64,
+    /// Beyond this nothing is of interest.
+    limit: f64,
     nearest: Option<(Meeting<'a>, Prim)>,
     /// The nearest other surface.
     second: f64,
@@ -176,17 +178,13 @@ impl<'a> Sight<'a> {
     pub fn new(ray: &'a Ray, sender: Sender, tmax: f64, passed: &'a mut Passed) -> Self {
         passed.clear();
         let (second, shade, leaves_at) = (f64::INFINITY, f64::INFINITY, f64::INFINITY);
-        Sight { ray, sender, tmax, nearest: None, second, shade, leaves_at, passed }
+        Sight { ray, sender, limit: tmax, nearest: None, second, shade, leaves_at, passed }
     }
 
     /// Beyond this nothing is of interest.
+    #[inline]
     pub fn limit(&self) -> f64 {
-        match &self.nearest {
-            Some((Meeting { t, .. }, _)) => {
-                (t + tolerance_at(self.ray, *t) / LEAST_COSINE).min(self.tmax)
-            }
-            None => self.tmax,
-        }
+        self.limit
     }
 
     /// Takes in what the ray met, if `counts` says that it is there.
@@ -228,6 +226,7 @@ impl<'a> Sight<'a> {
             t < other.t || (t == other.t && place(meeting, prim) < place(other, of))
         });
         if is_nearer {
+            self.limit = self.limit.min(t + tolerance_at(self.ray, t) / LEAST_COSINE);
             if let Some((before, _)) = self.nearest.replace((*meeting, *prim)) {
                 self.second = self.second.min(before.t);
             }

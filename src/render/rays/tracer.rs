@@ -273,7 +273,8 @@ fn counts(
     accept: &impl Fn(u32, u32, Vec2) -> bool,
 ) -> bool {
     match meeting.on {
-        On::Triangle { id, corners, space } if prim.is_cutout => {
+        On::Triangle { id, triangle, space } if prim.is_cutout => {
+            let corners = triangle.corners();
             let weights = match space {
                 Some(space) => barycentric(&space.localize(ray), corners),
                 None => barycentric(ray, corners),

@@ -73,8 +73,11 @@ impl Block {
     }
 
     /// The corners in a lane.
+    #[inline(always)]
     pub fn get(&self, lane: usize) -> [DVec3; 3] {
-        self.corners.map(|corner| DVec3::from(corner.map(|axis| f64::from(axis[lane]))))
+        let point = |[x, y, z]: &[Vec4; 3]| Vec3::new(x[lane], y[lane], z[lane]).as_dvec3();
+        let [a, b, c] = &self.corners;
+        [point(a), point(b), point(c)]
     }
 
     /// A bit for each lane whose triangle the line goes through, some of it between 0 and `tmax`.
@@ -99,6 +102,23 @@ impl Block {
         let within =
             a.2.max(b.2).max(c.2).cmpge(zero) & a.2.min(b.2).min(c.2).cmple(Vec4::splat(tmax));
         ((front | back) & within).bitmask()
+    }
+}
+
+/// One triangle of a block.
+#[derive(Clone, Copy, Debug)]
+pub struct OfBlock<'a> {
+    /// The block.
+    pub block: &'a Block,
+    /// Its lane.
+    pub lane: usize,
+}
+
+impl OfBlock<'_> {
+    /// Its corners.
+    #[inline]
+    pub fn corners(&self) -> [DVec3; 3] {
+        self.block.get(self.lane)
     }
 }
 
