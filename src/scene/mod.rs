@@ -58,7 +58,7 @@ pub use material::{AlphaMode, Coat, Material, Transmission, Volume};
 pub use medium::{FogBox, Medium};
 pub use mesh::{Instance, Mesh};
 pub use note::{Category, Note};
-pub use pose::{Channel, Interpolation, Keys, Node, Pose, Trs};
+pub use pose::{Blend, Channel, Interpolation, Keys, Node, Pose, Trs};
 pub use posing::Posing;
 pub use requirements::Requirements;
 pub use shutter::Shutter;

@@ -2,12 +2,14 @@
 
 mod cameras;
 mod coat;
+mod cones;
 mod corpus;
 mod deforming;
 mod files;
 mod filters;
 mod fog;
 mod glass;
+mod glows;
 mod gltf;
 mod lenses;
 mod links;

@@ -1,6 +1,7 @@
 //! Nodes, parents first, and what stands at them.
 
 use super::animation::{self, Animated, Channels};
+use super::cones::{self, Form};
 use super::document::{Node as Row, Real, Transform, UsdFog, UsdLux, label, usd_path};
 use super::filters::FilterTable;
 use super::geometry::{Compiled, Meshes};
@@ -49,6 +50,8 @@ struct Walk<'a> {
     lenses: BTreeMap<usize, Arc<LensKeys>>,
     /// By light of the file.
     strengths: BTreeMap<usize, Keys<Rgb>>,
+    /// By light of the file.
+    forms: BTreeMap<usize, Form>,
     /// For each node of the file where it was placed first.
     placed: Vec<Option<u32>>,
     meshes: Meshes,
@@ -65,16 +68,18 @@ struct Walk<'a> {
 
 /// Compiles the nodes of the file's scene and everything at them.
 pub(super) fn compile(source: &Source, output: &mut Output) -> Result<(), Fault> {
-    let Animated { channels, weights, lenses, strengths } = animation::compile(source, output)?;
+    let Animated { channels, weights, lenses, strengths, glows, forms } =
+        animation::compile(source, output)?;
     let mut walk = Walk {
         source,
         poses: Poses::new(source, output, &channels, weights)?,
         channels,
         lenses,
         strengths,
+        forms,
         hanging: Vec::new(),
         placed: vec![None; source.document.nodes.len()],
-        meshes: Meshes::new(source),
+        meshes: Meshes::new(source, glows),
         paths: PrimPaths::with_room(source.document.nodes.len()),
         links: LinkTable::default(),
         filters: FilterTable::default(),
@@ -197,17 +202,16 @@ impl Walk<'_> {
         let mut values = lights::values(lux.as_ref(), object)?;
         let shaping = self.profiles.shaping(self.source, output, lux.as_ref(), object)?;
         let told = (lux.as_ref(), shaping);
-        let mut light = lights::of_node(self.source, output, number, told, node, object)?
+        let of_file = (number, &self.forms);
+        let mut light = lights::of_node(self.source, output, of_file, told, node, object)?
             .map(|light| Light { values: values.take().map(Box::new), ..light });
         if let Some(light) = &mut light {
             lights::animate(self.source, output, number, light, &self.strengths)?;
         }
         let has_light = light.is_some();
-        if has_light {
-            self.links.add_light(output, links)?;
-            self.filters.add_light(output, filters)?;
+        if let Some(light) = light {
+            self.put_light(output, number, light, (links, filters))?;
         }
-        output.scene.lights.extend(light);
         let forced = lux.as_ref().is_some_and(|lux| lux.force);
         let document = self.source.document;
         let instances = document.beside.instances.get(&number);
@@ -261,6 +265,32 @@ impl Walk<'_> {
         Ok(())
     }
 
+    /// Puts a light at its node: as many as it has cones and ranges over time, all but the first at nodes of their own.
+    fn put_light(
+        &mut self,
+        output: &mut Output,
+        number: usize,
+        light: Light,
+        (links, filters): (Links, Option<u32>),
+    ) -> Result<(), Fault> {
+        let above = light.node;
+        let parts = cones::split(self.source, output, number, light, &self.forms)?;
+        for (i, (frame, light)) in parts.into_iter().enumerate() {
+            let node = match i {
+                0 => above,
+                _ => {
+                    let path =
+                        format!("{}[shaping {frame}]", output.scene.nodes[above as usize].path);
+                    self.push(output, &path, Some(above), (Trs::default(), Vec::new()))?
+                }
+            };
+            self.links.add_light(output, links)?;
+            self.filters.add_light(output, filters)?;
+            output.scene.lights.push(Light { node, ..light });
+        }
+        Ok(())
+    }
+
     /// Puts a mesh at a node of the scene: as a sphere light if it stands for one.
     fn put_mesh(
         &mut self,
@@ -277,7 +307,9 @@ impl Walk<'_> {
                 && material.emission_texture.is_none()
             {
                 let sphere = lights::sphere(material, radius, node, placed);
-                let values = placed.copy_values(output)?;
+                let primitives = &self.source.document.meshes[mesh.value()].primitives;
+                let glow = primitives.first().and_then(|first| self.meshes.glow(first));
+                let values = placed.copy_values(output, glow)?;
                 self.links.add_light(output, placed.links)?;
                 self.filters.add_light(output, placed.filters)?;
                 output.scene.lights.push(Light { values, ..sphere });
@@ -306,7 +338,7 @@ impl Walk<'_> {
             let Placed { shaping, forced, visibility, links, .. } = *placed;
             let bytes = size_of::<Instance>() + 2 * path.len();
             output.budget.take(bytes as u64, || placed.object.to_string())?;
-            let values = placed.copy_values(output)?;
+            let values = placed.copy_values(output, self.meshes.glow(&row.primitives[i]))?;
             if values.is_some() && output.scene.material_of(mesh).is_none() {
                 let text = "its light varies, but its mesh has no material; dark";
                 output.notes.add(Category::Lights, placed.object, text);

@@ -16,7 +16,8 @@
 //! | `instancing`, `geometry`, `attributes` | meshes |
 //! | `posing` | skins and morph targets |
 //! | `materials`, `glossiness`, `coat`, `glass`, `textures` | surfaces |
-//! | `lights`, `fog`, `cameras`, `lenses`, `strengths`, `animation` | what they say |
+//! | `lights`, `fog`, `cameras`, `lenses` | what they say |
+//! | `animation`, `targets`, `strengths`, `cones`, `key_table` | what moves and what varies |
 //! | `links`, `filters` | which lights light what, and what is in their way |
 
 mod accessors;
@@ -25,6 +26,7 @@ mod attributes;
 mod buffers;
 mod cameras;
 mod coat;
+mod cones;
 mod container;
 mod document;
 mod extensions;
@@ -36,6 +38,7 @@ mod glass;
 mod glossiness;
 mod hierarchy;
 mod instancing;
+mod key_table;
 mod lenses;
 mod lights;
 mod links;
@@ -43,6 +46,7 @@ mod materials;
 mod posing;
 mod profiles;
 mod strengths;
+mod targets;
 mod textures;
 
 use super::budget::Budget;
