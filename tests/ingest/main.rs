@@ -25,6 +25,7 @@ mod posing_puppets;
 mod probe;
 mod real;
 mod refused;
+mod responses;
 mod shared;
 mod strengths;
 mod usd;

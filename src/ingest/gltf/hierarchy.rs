@@ -9,11 +9,14 @@ use super::lights::{self, Placed};
 use super::links::LinkTable;
 use super::posing::{Hung, Pose, Poses};
 use super::profiles::Profiles;
+use super::responses::{self, ResponseTable};
 use super::{Output, Source, cameras, fog, instancing};
 use crate::ingest::error::Fault;
 use crate::ingest::paths::{PrimPaths, component};
 use crate::math::color::Rgb;
-use crate::scene::{Category, Channel, Instance, Keys, LensKeys, Light, Links, Node, Trs};
+use crate::scene::{
+    Category, Channel, Instance, Keys, LensKeys, Light, Links, Node, Response, Trs,
+};
 use glam::{DAffine3, DMat4, DQuat, DVec3};
 use gltf::json::{Index, Mesh};
 use std::collections::{BTreeMap, HashMap};
@@ -61,6 +64,7 @@ struct Walk<'a> {
     paths: PrimPaths,
     links: LinkTable,
     filters: FilterTable,
+    responses: ResponseTable,
     profiles: Profiles,
     /// For each node of the scene, whether neither it nor an ancestor ever scales unevenly.
     uniform: Vec<bool>,
@@ -83,6 +87,7 @@ pub(super) fn compile(source: &Source, output: &mut Output) -> Result<(), Fault>
         paths: PrimPaths::with_room(source.document.nodes.len()),
         links: LinkTable::default(),
         filters: FilterTable::default(),
+        responses: ResponseTable::default(),
         profiles: Profiles::default(),
         uniform: Vec::new(),
     };
@@ -119,6 +124,7 @@ pub(super) fn compile(source: &Source, output: &mut Output) -> Result<(), Fault>
     }
     walk.hang(output)?;
     mem::take(&mut walk.filters).finish(output);
+    mem::take(&mut walk.responses).finish(output);
     walk.links.finish(output)
 }
 
@@ -193,6 +199,7 @@ impl Walk<'_> {
         self.filters.add(output, &row.extras, node, object)?;
         let lux = UsdLux::of(&row.extras, object)?;
         let filters = self.filters.of_light(output, lux.as_ref(), object)?;
+        let response = responses::of_light(lux.as_ref(), object)?;
         let links = Links { membership, ..self.links.of_light(lux.as_ref(), object)? };
         if let Some(group) = lux.as_ref().and_then(|lux| lux.group.as_ref()) {
             let bytes = size_of::<(u32, String)>() + group.len();
@@ -210,7 +217,7 @@ impl Walk<'_> {
         }
         let has_light = light.is_some();
         if let Some(light) = light {
-            self.put_light(output, number, light, (links, filters))?;
+            self.put_light(output, number, light, (links, filters, response))?;
         }
         let forced = lux.as_ref().is_some_and(|lux| lux.force);
         let document = self.source.document;
@@ -230,8 +237,18 @@ impl Walk<'_> {
         }
         let (lux, values) = (lux.as_ref(), values.as_ref());
         let visibility = lights::visibility(lux);
-        let placed =
-            Placed { lux, shaping, values, forced, visibility, links, filters, has_light, object };
+        let placed = Placed {
+            lux,
+            shaping,
+            values,
+            forced,
+            visibility,
+            links,
+            filters,
+            response,
+            has_light,
+            object,
+        };
         let pose = self.poses.of(self.source, output, (number, row), mesh)?;
         let Some(instances) = instances else {
             if pose.is_skinned() && self.placed[number] != Some(node) {
@@ -271,7 +288,7 @@ impl Walk<'_> {
         output: &mut Output,
         number: usize,
         light: Light,
-        (links, filters): (Links, Option<u32>),
+        (links, filters, response): (Links, Option<u32>, Response),
     ) -> Result<(), Fault> {
         let above = light.node;
         let parts = cones::split(self.source, output, number, light, &self.forms)?;
@@ -286,6 +303,7 @@ impl Walk<'_> {
             };
             self.links.add_light(output, links)?;
             self.filters.add_light(output, filters)?;
+            self.responses.add_light(output, response)?;
             output.scene.lights.push(Light { node, ..light });
         }
         Ok(())
@@ -312,6 +330,7 @@ impl Walk<'_> {
                 let values = placed.copy_values(output, glow)?;
                 self.links.add_light(output, placed.links)?;
                 self.filters.add_light(output, placed.filters)?;
+                self.responses.add_light(output, placed.response)?;
                 output.scene.lights.push(Light { values, ..sphere });
                 return Ok(());
             }
@@ -348,6 +367,7 @@ impl Walk<'_> {
             let membership = self.links.of_primitive(output, primitive, above, placed.object)?;
             self.links.add_instance(output, Links { membership, ..links })?;
             self.filters.add_instance(output, placed.filters)?;
+            self.responses.add_instance(output, placed.response)?;
             if let Some(hung) = hung {
                 let bytes = size_of::<Hanging>() as u64;
                 output.budget.take(bytes, || placed.object.to_string())?;

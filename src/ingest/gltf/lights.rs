@@ -7,8 +7,8 @@ use crate::ingest::error::Fault;
 use crate::ingest::image::{self, Coding};
 use crate::math::color::Rgb;
 use crate::scene::{
-    Category, Interpolation, Keys, Light, LightKind, Links, Material, Shaping, Texture, Visibility,
-    Wrap,
+    Category, Interpolation, Keys, Light, LightKind, Links, Material, Response, Shaping, Texture,
+    Visibility, Wrap,
 };
 use gltf::json::extensions::scene::khr_lights_punctual::{Light as Row, Type};
 use gltf::json::validation::Checked;
@@ -31,6 +31,8 @@ pub(super) struct Placed<'a> {
     pub links: Links,
     /// The number of the filters of the node's light.
     pub filters: Option<u32>,
+    /// How much of the node's light surfaces reflect.
+    pub response: Response,
     /// Whether a light has the node's path already.
     pub has_light: bool,
     pub object: &'a str,

@@ -18,7 +18,7 @@
 //! | `materials`, `glossiness`, `coat`, `glass`, `textures` | surfaces |
 //! | `lights`, `fog`, `cameras`, `lenses` | what they say |
 //! | `animation`, `targets`, `strengths`, `cones`, `key_table` | what moves and what varies |
-//! | `links`, `filters` | which lights light what, and what is in their way |
+//! | `links`, `filters`, `responses` | which lights light what, what is in their way, how much is reflected |
 
 mod accessors;
 mod animation;
@@ -45,6 +45,7 @@ mod links;
 mod materials;
 mod posing;
 mod profiles;
+mod responses;
 mod strengths;
 mod targets;
 mod textures;
