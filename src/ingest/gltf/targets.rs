@@ -13,6 +13,12 @@ use gltf::json::validation::Checked;
 /// Where pointers to lights begin.
 const LIGHTS: &str = "/extensions/KHR_lights_punctual/lights/";
 
+/// What is read of the animation of a node.
+const OF_NODES: [&str; 4] = ["translation", "rotation", "scale", WEIGHTS];
+
+/// Where pointers to rows of a table begin, what these are, and what is read of their animation.
+type Kind = (&'static str, fn(usize) -> Moved, &'static [&'static str]);
+
 /// What a channel animates a part of, by its number in the file.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub(super) enum Moved {
@@ -74,12 +80,11 @@ pub(super) fn can_move(document: &Document, moves: Moved, path: &str) -> bool {
 
 /// What a channel moves and which part of it, directly or by a pointer.
 pub(super) fn target(target: &Target) -> Option<(Moved, &'static str)> {
-    let parts = ["translation", "rotation", "scale", WEIGHTS];
     let Some(pointer) = &target.extensions.pointer else {
-        return Some((Moved::Node(target.node?.value()), find(&parts, &target.path)?));
+        return Some((Moved::Node(target.node?.value()), find(&OF_NODES, &target.path)?));
     };
-    let kinds: [(&str, fn(usize) -> Moved, &[&'static str]); 5] = [
-        ("/nodes/", Moved::Node, &parts),
+    let kinds: [Kind; 5] = [
+        ("/nodes/", Moved::Node, &OF_NODES),
         ("/cameras/", Moved::Camera, &[YFOV, YMAG]),
         (LIGHTS, Moved::Light, &[COLOR, INTENSITY, OUTER, INNER, RANGE]),
         ("/materials/", Moved::Material, &[FACTOR, STRENGTH]),
