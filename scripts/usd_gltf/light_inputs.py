@@ -5,8 +5,8 @@
 in nits (usdLux/schema.usda, "Quantities and Units"). What is read here leaves out the sizeFactor,
 which depends on where an instance of the light stands (`light_carriers`).
 
-The diffuse and specular multipliers are no part of the formula and have no carrier. A light whose
-diffuse multiplier is m is carried m times as bright, which is right for everything but highlights.
+The diffuse and specular multipliers are no part of the formula: the light is as bright as ever to who looks at it, and
+surfaces reflect it by them (`extras.usdLux`).
 """
 
 from __future__ import annotations
@@ -19,6 +19,7 @@ from pxr import Sdf, Usd, UsdLux
 
 from . import light_groups, light_visibility
 from .arnold_placement import placement_names
+from .gltf_document import number
 from .light_attributes import LightAttributes, arnold_names, arnold_names_of, is_arnolds_mesh_light, is_finite
 from .light_filters import FilterReader, LightFilters
 from .light_losses import report_losses
@@ -47,7 +48,7 @@ _AXES = {
 _THINNEST = 1e-6
 """A size that shrinks to 0 shrinks to this share of its largest: a matrix of scale 0 has no axes."""
 
-_BRIGHTNESS = ("intensity", "exposure", "color", "enableColorTemperature", "colorTemperature", "diffuse")
+_BRIGHTNESS = ("intensity", "exposure", "color", "enableColorTemperature", "colorTemperature")
 
 
 @dataclass
@@ -87,6 +88,8 @@ class Light:
     """The lights in its place that it is at other times, if its shaping changes (`light_shaping`)."""
     lit_at: float | None = None
     """If there are others, the first time code at which it is the one that shines."""
+    response: dict[str, float] = field(default_factory=dict)
+    """How much of it surfaces reflect, `diffuse` and `specular`, where that is not 1."""
     group: str | None = None
     """The light group that it is in, if the stage names one."""
 
@@ -104,6 +107,7 @@ class Light:
             extras["visibility"] = self.visibility
         if self.group is not None:
             extras["group"] = self.group
+        extras.update(self.response)
         return extras
 
 
@@ -135,6 +139,7 @@ def read_light(
         casts_shadows=bool(inputs.still("shadow:enable")),
         material_sync="independent" if inputs.is_arnolds else str(prim.GetAttribute("light:materialSyncMode").Get() or "noMaterialResponse"),
         inputs=_verbatim(inputs),
+        response=_response(inputs),
         visibility=light_visibility.read_visibility(prim, kind, frames.first, report),
         group=light_groups.read_group(prim, frames.first, report),
     )
@@ -250,7 +255,6 @@ def _emission(inputs: LightAttributes, computed: Computed | None, filters: Light
 def _emission_at(inputs: LightAttributes, computed: Computed | None, code: float) -> np.ndarray:
     exposure = inputs.at("exposure", code)
     scale = inputs.at("intensity", code) * (2.0**exposure if abs(exposure) < 1000 else math.nan)
-    scale *= inputs.at("diffuse", code)
     color = inputs.color(code) if computed is None else computed.at(inputs.frames, code)
     if inputs.at("enableColorTemperature", code) and (computed is None or computed.is_tinted):
         kelvin = inputs.at("colorTemperature", code)
@@ -262,6 +266,20 @@ def _emission_at(inputs: LightAttributes, computed: Computed | None, code: float
         color = color * np.array(UsdLux.BlackbodyTemperatureAsRgb(kelvin), dtype=float)
     with np.errstate(invalid="ignore", over="ignore"):
         return scale * color
+
+
+def _response(inputs: LightAttributes) -> dict[str, float]:
+    """The multipliers of what surfaces reflect, those that are not 1."""
+    response = {}
+    for name in ("diffuse", "specular"):
+        value = float(inputs.still(name))
+        if not 0 <= value <= float(np.finfo(np.float32).max):
+            why = f"it is {value}; 0 is used"
+            inputs.report.warn(inputs.path, f"inputs:{name} is negative or not finite", why)
+            value = 0.0
+        if value != 1.0:
+            response[name] = number(value)
+    return response
 
 
 def _verbatim(inputs: LightAttributes) -> dict:

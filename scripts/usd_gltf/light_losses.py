@@ -7,20 +7,8 @@ from .light_attributes import LightAttributes
 
 def report_losses(inputs: LightAttributes) -> None:
     """Report everything about a light that the file holds only as extras, or not at all."""
-    _multipliers(inputs)
     _shadows(inputs)
     _relations(inputs)
-
-
-def _multipliers(inputs: LightAttributes) -> None:
-    diffuse, specular = inputs.first("diffuse"), inputs.first("specular")
-    if diffuse == 1.0 and specular == 1.0 and not inputs.varies("diffuse") and not inputs.varies("specular"):
-        return
-    why = f"multipliers have no carrier; the whole light is carried {diffuse:g} times as bright"
-    if specular != diffuse:
-        why += f", highlights too, which should be {specular:g} times as bright"
-    name = "diffuse" if diffuse != 1.0 or inputs.varies("diffuse") else "specular"
-    inputs.report.warn(inputs.path, f"inputs:{name}", why)
 
 
 def _shadows(inputs: LightAttributes) -> None:

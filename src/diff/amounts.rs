@@ -3,6 +3,7 @@
 use super::change::{Apart, Difference};
 use super::light::Described;
 use crate::math::angle;
+use crate::scene::Response;
 use glam::{DMat3, DVec3, Vec3};
 
 /// A smaller difference between half angles of cones is rounding of their axes, degrees.
@@ -57,6 +58,11 @@ pub(super) fn differences(
     }
     if a.forced != b.forced {
         found.push(Difference::Forced { before: a.forced, after: b.forced });
+    }
+    let [before_own, after_own] = [before, after].map(|version| version.profile.response);
+    if before_own != after_own {
+        let both = |response: Response| [response.diffuse, response.specular];
+        found.push(Difference::Response { before: both(before_own), after: both(after_own) });
     }
     found.extend_from_slice(links);
     let goes_on = apart.is_some_and(|apart| exceeds(&apart, &found));

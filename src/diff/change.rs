@@ -91,6 +91,13 @@ pub enum Difference {
         /// After.
         after: bool,
     },
+    /// How much of it surfaces reflect: the multipliers of what diffuse lobes do, and others.
+    Response {
+        /// Diffuse and specular before.
+        before: [f32; 2],
+        /// And after.
+        after: [f32; 2],
+    },
     /// Which prims it lights.
     LightLink {
         /// Those of two scenes; `None` where a tree file tells only that it lights others.
@@ -167,6 +174,7 @@ impl Difference {
             Difference::Cone { .. } => "cone",
             Difference::Kind { .. } => "kind",
             Difference::Forced { .. } => "forced",
+            Difference::Response { .. } => "response",
             Difference::LightLink { .. } => "light_link",
             Difference::ShadowLink { .. } => "shadow_link",
             Difference::Range { .. } => "range",

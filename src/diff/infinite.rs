@@ -6,7 +6,7 @@ use super::profile::{add_texture, short, with_filters};
 use super::scene_side::kind;
 use crate::emitter::infinite_lights;
 use crate::light_tree::{LightLook, LightRow};
-use crate::scene::{Keys, LightKind, Pose, Posing, Scene};
+use crate::scene::{Keys, LightKind, Pose, Posing, Response, Scene};
 use glam::Vec3;
 use std::collections::HashMap;
 
@@ -38,10 +38,13 @@ pub(super) fn find(scene: &Scene, pose: &Pose, frames: &[i32]) -> Vec<Infinite> 
         let profile = profile(scene, &light.kind);
         let filters = scene.light_filters.of_light(row as u32);
         let pattern = with_filters(profile.pattern, scene, pose, filters);
-        let profile = Profile { pattern, ..profile };
+        let response = scene.light_responses.of_light(row as u32);
+        let profile = Profile { pattern, response, ..profile };
         let mut hasher = blake3::Hasher::new();
         hasher.update(&profile.pattern.to_le_bytes());
         hasher.update(&profile.half_angle_rad.unwrap_or(0.0).to_le_bytes());
+        let Response { diffuse, specular } = response;
+        hasher.update(bytemuck::bytes_of(&[diffuse, specular]));
         hasher.update(bytemuck::bytes_of(&rgb));
         hasher.update(bytemuck::bytes_of(&pose.world(light.node).matrix3.to_cols_array()));
         if let Some(keys) = light.values.as_deref().filter(|keys| keys.varies()) {
@@ -91,10 +94,10 @@ fn profile(scene: &Scene, kind: &LightKind) -> Profile {
         LightKind::Dome { texture: Some(texture), .. } => {
             let mut hasher = blake3::Hasher::new();
             add_texture(&mut hasher, &scene.textures[texture as usize]);
-            Profile { pattern: short(&hasher), half_angle_rad: None, turn: 0 }
+            Profile { pattern: short(&hasher), ..Profile::default() }
         }
         LightKind::Distant { angle_rad, .. } => {
-            Profile { pattern: 0, half_angle_rad: Some(0.5 * angle_rad), turn: 0 }
+            Profile { half_angle_rad: Some(0.5 * angle_rad), ..Profile::default() }
         }
         _ => Profile::default(),
     }

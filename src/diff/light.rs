@@ -2,6 +2,7 @@
 
 use super::card::{Kind, LightCard};
 use crate::light_tree::{LightLook, LightRow};
+use crate::scene::Response;
 use glam::{Affine3A, Vec3, Vec3A};
 
 /// What a light is matched by. It is kept small, because there may be millions of lights.
@@ -43,6 +44,8 @@ pub(super) struct Profile {
     pub half_angle_rad: Option<f32>,
     /// A hash of its axes in the world, if a turn about the one that it is aimed along changes what it lights; else 0.
     pub turn: u64,
+    /// How much of it surfaces reflect.
+    pub response: Response,
 }
 
 /// Everything that two versions of a light are compared by.

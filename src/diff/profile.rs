@@ -3,7 +3,7 @@
 use super::light::Profile;
 use crate::emitter::{Emitters, LightSource, MeshLight};
 use crate::math::directions::light_axes;
-use crate::scene::{IesProfile, Pixels, Pose, Scene, Shaping, Texture};
+use crate::scene::{IesProfile, Pixels, Pose, Response, Scene, Shaping, Texture};
 use glam::Vec3;
 use rayon::prelude::*;
 
@@ -31,8 +31,13 @@ impl Profiles {
             LightSource::Mesh { instance, .. } => scene.light_filters.of_instance(instance),
             LightSource::Light(row) => scene.light_filters.of_light(row),
         };
+        let response = match source {
+            LightSource::Mesh { instance, .. } => scene.light_responses.of_instance(instance),
+            LightSource::Light(row) => scene.light_responses.of_light(row),
+        };
         let profile = self.unfiltered(scene, pose, source);
-        Profile { pattern: with_filters(profile.pattern, scene, pose, filters), ..profile }
+        let pattern = with_filters(profile.pattern, scene, pose, filters);
+        Profile { pattern, response, ..profile }
     }
 
     fn unfiltered(&self, scene: &Scene, pose: &Pose, source: LightSource) -> Profile {
@@ -52,7 +57,10 @@ impl Profiles {
         let mut hasher = blake3::Hasher::new();
         hasher.update(&texture.to_le_bytes());
         match shaping {
-            None => return Profile { pattern: texture, half_angle_rad, turn },
+            None => {
+                let response = Response::PLAIN;
+                return Profile { pattern: texture, half_angle_rad, turn, response };
+            }
             Some(Shaping::Khr { inner_rad, .. }) => {
                 hasher.update(&[1]).update(&inner_rad.to_le_bytes());
             }
@@ -70,7 +78,7 @@ impl Profiles {
                 });
             }
         }
-        Profile { pattern: short(&hasher), half_angle_rad, turn }
+        Profile { pattern: short(&hasher), half_angle_rad, turn, response: Response::PLAIN }
     }
 
     /// The hash of the emitters of a mesh light, in its own space.

@@ -2,7 +2,7 @@
 //!
 //! Energy is the luminance of the peak radiant intensity: `I` of a point, `L A` of a triangle,
 //! `L pi r^2` of a sphere. With a photometric profile it is the mean over directions that counts and not the peak, which
-//! may be anywhere. It is never quite zero: an emitter that a transform or the shape of its mesh has
+//! may be anywhere. Of a light with multipliers it is what the larger of them leaves. It is never quite zero: an emitter that a transform or the shape of its mesh has
 //! flattened, or that is dark in this frame, keeps its place in the tree.
 
 use super::mesh_light::MeshLight;
@@ -42,7 +42,8 @@ impl PosedEmitters<'_> {
                 LightSource::Mesh { instance: row, mesh_light } => {
                     let mesh_light = &self.emitters.mesh_lights()[mesh_light as usize];
                     let instance = &self.scene.instances[row as usize];
-                    let nits = self.scene.rgb_of_instance(row, self.pose);
+                    let effect = self.scene.effect_of_instance(row);
+                    let nits = self.scene.rgb_of_instance(row, self.pose) * effect;
                     self.triangle_bounds(mesh_light, own, &self.pose.world(instance.node), nits)
                 }
                 LightSource::Light(row) => self.bounds_of_light(row),
@@ -80,7 +81,8 @@ impl PosedEmitters<'_> {
         let world = self.pose.world(self.scene.instances[row as usize].node);
         let to_local = Similarity::undoing(&world)?;
         let peak = luminance(self.emitters.mesh_lights()[mesh_light as usize].peak_nits);
-        let brightness = luminance(self.scene.rgb_of_instance(row, self.pose)) / peak;
+        let nits = self.scene.rgb_of_instance(row, self.pose) * self.scene.effect_of_instance(row);
+        let brightness = luminance(nits) / peak;
         Some((to_local, brightness / to_local.scale().powi(2)))
     }
 
@@ -111,7 +113,8 @@ impl PosedEmitters<'_> {
 
     fn bounds_of_light(&self, row: u32) -> LightBounds {
         let light = &self.scene.lights[row as usize];
-        let strength = luminance(self.scene.rgb_of_light(row, self.pose));
+        let rgb = self.scene.rgb_of_light(row, self.pose) * self.scene.effect_of_light(row);
+        let strength = luminance(rgb);
         let here = Vec3::from(self.pose.world(light.node).translation);
         let world = self.pose.world(light.node);
         let aimed = |shaping: &Shaping| self.lit_cone(shaping, &world);
@@ -181,12 +184,14 @@ impl PosedEmitters<'_> {
                 };
                 let nits = self.scene.rgb_of_instance(row, self.pose) * mean;
                 let profile = self.profile(instance.shaping, instance.node, -direction);
-                luminance(nits * profile) * (0.5 * seen) as f32
+                let effect = self.scene.effect_of_instance(row);
+                luminance(nits * profile) * effect * (0.5 * seen) as f32
             }
             EmitterPlace::Light(row) => {
                 let light = &self.scene.lights[row as usize];
                 let profile = self.profile(light.kind.shaping(), light.node, -direction);
-                let strength = luminance(self.scene.rgb_of_light(row, self.pose) * profile);
+                let rgb = self.scene.rgb_of_light(row, self.pose) * self.scene.effect_of_light(row);
+                let strength = luminance(rgb * profile);
                 match light.kind {
                     LightKind::Sphere { .. } => strength * PI * self.sphere(light).radius.powi(2),
                     _ => strength,

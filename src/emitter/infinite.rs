@@ -22,6 +22,8 @@ pub struct InfiniteLight<'a> {
     pub forced: bool,
     /// Which rays meet it.
     pub visibility: Visibility,
+    /// How many times it counts where lights are picked.
+    effect: f64,
     kind: Kind<'a>,
 }
 
@@ -71,7 +73,8 @@ impl Skies {
             let rgb = scene.rgb_of_light(light as u32, pose);
             let kind = self.kind(scene, pose, light, rgb)?;
             let (forced, visibility) = (row.forced, row.visibility);
-            Some(InfiniteLight { light, forced, visibility, kind })
+            let effect = scene.effect_of_light(light as u32).into();
+            Some(InfiniteLight { light, forced, visibility, effect, kind })
         });
         found.collect()
     }
@@ -121,8 +124,12 @@ impl Skies {
 
 impl InfiniteLight<'_> {
     /// An estimate of the irradiance on a surface with this normal (zero: in any direction), lux. It is 0
-    /// only where no light arrives. It competes with the importance of the tree.
+    /// only where no light arrives, or nothing reflects it. It competes with the importance of the tree.
     pub fn importance(&self, normal: Vec3) -> f64 {
+        self.effect * self.illuminance(normal)
+    }
+
+    fn illuminance(&self, normal: Vec3) -> f64 {
         match &self.kind {
             Kind::Sun(sun) => {
                 let cosine = if normal == Vec3::ZERO {

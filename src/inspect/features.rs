@@ -127,6 +127,8 @@ fn lights(needs: &Requirements, emitters: &Emitters) -> Vec<Feature> {
         Feature::new("lights hidden from some rays", needs.hidden),
         Feature::new("lights with filters", needs.filtered_lights)
             .with("weighed by the tree as if they had none"),
+        Feature::new("lights with multipliers", needs.lights_with_multipliers)
+            .with("weighed by the larger of diffuse and specular; reflected light is split in two"),
         Feature::new("light links", needs.light_links)
             .with("numbers of lights, in the tree file; surfaces that not all lights light pick by them")
             .taking(if emitters.link_sets().is_empty() { 0 } else { 4 * emitters.lights().len() }),

@@ -118,7 +118,7 @@ fn contribution(
         if !vertex.lets_through(found.direction) {
             return None;
         }
-        let (reflected, bsdf_pdf) = vertex.reflection.eval(found.direction);
+        let (reflected, bsdf_pdf) = integrator.reflects(vertex, light, found.direction);
         let pdf = found.pdf.unwrap_or(1.0);
         let value = Contribution {
             luminance: luminance(reflected * found.radiance) / pdf,

@@ -224,6 +224,7 @@ impl<'a> RenderDelegate<'a> {
                 camera: *camera,
                 cells: learned.map(|learned| learned.cells),
                 filters: filters[at].as_ref(),
+                responses: Some(&scene.light_responses).filter(|all| !all.is_empty()),
                 fog: fog[at].clone(),
                 groups: self.plan.as_ref().ok().and_then(|plan| plan.groups.as_ref()),
                 found_by_reflection: match settings.mis {

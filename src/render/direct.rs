@@ -8,6 +8,7 @@ use crate::emitter::{EmitterPlace, Source};
 use crate::light_tree::{Picked, Splitting};
 use crate::math::color::{Rgb, luminance};
 use crate::math::random::hash;
+use crate::scene::Response;
 use glam::{Vec2, Vec3};
 
 /// Light that may arrive at a point, if nothing is in its way.
@@ -63,6 +64,37 @@ impl Integrator<'_> {
                 filters.of_light(light as u32, point, source)
             }
         }
+    }
+
+    /// The multipliers of a light, unless no light has any.
+    #[inline]
+    fn response(&self, light: Picked) -> Option<Response> {
+        let responses = self.responses?;
+        Some(match light {
+            Picked::Emitter(emitter) => match self.emitters.emitters.place_of(emitter) {
+                EmitterPlace::Triangle { instance, .. } => responses.of_instance(instance),
+                EmitterPlace::Light(row) => responses.of_light(row),
+            },
+            Picked::Beside(row) => responses.of_light(self.infinite[row as usize].light as u32),
+        })
+    }
+
+    /// What a vertex reflects of a light in some direction, `f |cos|` times the light's multipliers, and the density with
+    /// which its reflected rays go there, 1/sr.
+    #[inline]
+    pub fn reflects(&self, vertex: &Vertex, light: Picked, direction: Vec3) -> (Rgb, f32) {
+        let (whole, pdf) = vertex.reflection.eval(direction);
+        match self.response(light) {
+            None | Some(Response::PLAIN) => (whole, pdf),
+            Some(response) => (response.of(whole, vertex.reflection.diffuse_part(direction)), pdf),
+        }
+    }
+
+    /// What multiplies the light that a reflected ray finds, given the diffuse share of what was reflected.
+    #[inline]
+    pub(super) fn reflected_share(&self, light: Picked, diffuse_share: Rgb) -> Rgb {
+        let response = self.response(light);
+        response.map_or(Rgb::ONE, |response| response.of(Rgb::ONE, diffuse_share))
     }
 
     /// What a vertex reflects of the lights that are picked for it. `u_pick` picks the lights, `u` samples
@@ -139,7 +171,7 @@ impl Integrator<'_> {
         if !vertex.lets_through(incoming.direction) {
             return Rgb::ZERO;
         }
-        let (reflected, bsdf_pdf) = vertex.reflection.eval(incoming.direction);
+        let (reflected, bsdf_pdf) = self.reflects(vertex, pick.light, incoming.direction);
         let probability = pick.probability as f32;
         match incoming.pdf {
             None => reflected * incoming.radiance / probability,

@@ -24,7 +24,7 @@ use crate::light_tree::{Cell, Picked, Receiver, Splitting};
 use crate::math::built_in;
 use crate::math::color::Rgb;
 use crate::math::random::{Sampler, hash};
-use crate::scene::Visibility;
+use crate::scene::{LightResponses, Visibility};
 use glam::{Vec2, Vec3};
 
 /// Bounces before Russian roulette may end a path.
@@ -54,6 +54,8 @@ pub struct Integrator<'a> {
     pub links: Option<FrameLinks<'a>>,
     /// What lights are filtered by, if any are.
     pub filters: Option<&'a PosedFilters<'a>>,
+    /// How much of which lights surfaces reflect, if not all of all.
+    pub responses: Option<&'a LightResponses>,
     /// What fills the space, if anything does.
     pub fog: Option<Fog>,
     /// Which light group each light is in, if that is asked for.
@@ -120,6 +122,8 @@ struct Origin {
     point: Vec3,
     normal: Vec3,
     bsdf_pdf: f32,
+    /// How much of what it reflects its diffuse lobe does, if anybody asks.
+    diffuse_share: Rgb,
 }
 
 /// A thread's buffers, reused from path to path.
@@ -262,7 +266,12 @@ impl Integrator<'_> {
             }
             let Receiver { point, normal } = vertex.receiver;
             let how = *self.picker.splitting(bounce);
-            before = Some(Origin { wanted, how, point, normal, bsdf_pdf: next.pdf });
+            let diffuse_share = match self.responses {
+                Some(_) => vertex.reflection.diffuse_share(next.wi),
+                None => Rgb::ZERO,
+            };
+            let bsdf_pdf = next.pdf;
+            before = Some(Origin { wanted, how, point, normal, bsdf_pdf, diffuse_share });
             origin = vertex.anchor.origin_toward(next.wi);
             direction = next.wi;
             inside = if vertex.is_beyond(next.wi) { vertex.beyond } else { vertex.here };
@@ -374,9 +383,10 @@ impl Integrator<'_> {
             let pdf = || self.emitters.pdf(&at, before.point);
             self.weight_of_hit(before, light, scratch, pdf)
         });
-        let filtered = before
-            .as_ref()
-            .map_or(Rgb::ONE, |before| self.filtered(light, before.point, Source::Point(at.point)));
+        let filtered = before.as_ref().map_or(Rgb::ONE, |before| {
+            self.filtered(light, before.point, Source::Point(at.point))
+                * self.reflected_share(light, before.diffuse_share)
+        });
         let arriving = throughput * (radiance * filtered * weight);
         self.count_in_group(light, arriving, &mut scratch.by_group);
         arriving
@@ -407,6 +417,7 @@ impl Integrator<'_> {
             });
             let filtered = before.as_ref().map_or(Rgb::ONE, |before| {
                 self.filtered(picked, before.point, Source::Direction(direction))
+                    * self.reflected_share(picked, before.diffuse_share)
             });
             let light = radiance * filtered * weight;
             self.count_in_group(picked, throughput * light, &mut scratch.by_group);

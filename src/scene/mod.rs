@@ -15,6 +15,7 @@
 //! | [`profiles`](Scene::profiles) | how the light of a luminaire was measured to depend on direction |
 //! | [`light_groups`](Scene::light_groups) | a name for the lights at a node and below |
 //! | [`light_filters`](Scene::light_filters) | what multiplies the light of some lights on its way |
+//! | [`light_responses`](Scene::light_responses) | how much of some lights surfaces reflect |
 //! | [`linking`](Scene::linking) | what lights light, and what casts their shadows, where that is not everything |
 //! | [`medium`](Scene::medium) | the fog that fills it, or a box of it; one or none |
 //! | [`cameras`](Scene::cameras) | a view from a node |
@@ -31,6 +32,7 @@ mod ies_profile;
 mod lens;
 mod light;
 mod light_filter;
+mod light_response;
 mod linking;
 mod material;
 mod medium;
@@ -53,12 +55,13 @@ pub use ies_profile::{IesProfile, IesTable, LitCone, Pole};
 pub use lens::LensKeys;
 pub use light::{Light, LightKind, Shaping};
 pub use light_filter::{BlockerShape, FilterKind, LightFilter, LightFilters, Rod};
+pub use light_response::{LightResponses, Response};
 pub use linking::{LinkRows, Linking, Links, Membership};
 pub use material::{AlphaMode, Coat, Material, Transmission, Volume};
 pub use medium::{FogBox, Medium};
 pub use mesh::{Instance, Mesh};
 pub use note::{Category, Note};
-pub use pose::{Channel, Interpolation, Keys, Node, Pose, Trs};
+pub use pose::{Blend, Channel, Interpolation, Keys, Node, Pose, Trs};
 pub use posing::Posing;
 pub use requirements::Requirements;
 pub use shutter::Shutter;
@@ -100,6 +103,8 @@ pub struct Scene {
     pub light_groups: BTreeMap<u32, String>,
     /// Which lights have which filters.
     pub light_filters: LightFilters,
+    /// How much of which lights surfaces reflect, where that is not all.
+    pub light_responses: LightResponses,
     /// Which lights light what, and what casts shadows from them.
     pub linking: Linking,
     /// The fog in it, if there is any.

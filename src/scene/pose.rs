@@ -352,7 +352,9 @@ pub trait Blend: Copy {
     /// The same in double precision.
     type Exact: Mul<f64, Output = Self::Exact> + Sum;
 
+    /// The value in double precision.
     fn exact(self) -> Self::Exact;
+    /// What is a share of the way from one value to another.
     fn lerp(from: Self::Exact, to: Self::Exact, share: f64) -> Self::Exact;
 }
 

@@ -36,6 +36,8 @@ pub struct Requirements {
     pub hidden: usize,
     /// Mesh lights and other lights with filters.
     pub filtered_lights: usize,
+    /// Mesh lights and other lights of which surfaces reflect more or less than they give.
+    pub lights_with_multipliers: usize,
     /// Mesh lights and other lights that do not light everything.
     pub light_links: usize,
     /// Those from which not everything casts shadows.
@@ -95,6 +97,9 @@ impl Requirements {
         let filters = &scene.light_filters;
         needs.filtered_lights =
             filters.filtered_instances().filter(shines).count() + filters.filtered_lights().count();
+        let responses = &scene.light_responses;
+        needs.lights_with_multipliers =
+            responses.instances().filter(shines).count() + responses.lights().count();
         let linking = &scene.linking;
         let of_meshes = linking.linked_instances().filter(|(row, _)| shines(row));
         for (_, links) in of_meshes.chain(linking.linked_lights()) {

@@ -29,7 +29,8 @@ OLD = {
     "exposure": ("float", "3", lambda s: s.nits("/L"), [8] * 3),
     "radius": ("float", "2", lambda s: s.area("/L"), 4 * math.pi),
     "normalize": ("bool", "1", lambda s: s.nits("/L"), [1 / (0.25 * math.pi)] * 3),
-    "diffuse": ("float", "0.5", lambda s: s.nits("/L"), [0.5] * 3),
+    "diffuse": ("float", "0.5", lambda s: s.lux("/L")["diffuse"], 0.5),
+    "specular": ("float", "0", lambda s: s.lux("/L")["specular"], 0),
     "shaping:cone:angle": ("float", "30", lambda s: s.lux("/L")["shaping"]["coneAngle"], 30),
     "shaping:focus": ("float", "2", lambda s: s.lux("/L")["shaping"]["focus"], 2),
 }
@@ -170,13 +171,29 @@ def test_values_of_a_wrong_type_are_reported_and_harmless(export):
     assert Gltf(result.path).nits("/L") == pytest.approx([1] * 3)
 
 
-@pytest.mark.parametrize(
-    ("diffuse", "specular", "share"), [(0.5, 0.5, 0.5), (0.25, 1, 0.25), (1, 0, 1), (0, 1, 0)]
-)
-def test_multipliers_scale_the_light_and_are_listed(export, diffuse, specular, share):
-    result = export(f'def RectLight "L" {{ float inputs:diffuse = {diffuse}\n float inputs:specular = {specular} }}')
-    assert Gltf(result.path).nits("/L") == pytest.approx([share] * 3)
-    assert {"inputs:diffuse", "inputs:specular"} & result.warned("lights")
+@pytest.mark.parametrize("kind", ["RectLight", "SphereLight", "DistantLight", "DomeLight"])
+@pytest.mark.parametrize(("diffuse", "specular"), [(0.5, 0.5), (0.25, 1), (1, 0), (0, 3)])
+def test_multipliers_are_carried_and_leave_the_light_as_it_is(export, kind, diffuse, specular):
+    plain = Gltf(export(f'def {kind} "L" {{}}').path)
+    result = export(f'def {kind} "L" {{ float inputs:diffuse = {diffuse}\n float inputs:specular = {specular} }}')
+    scene = Gltf(result.path)
+    told = {name: scene.lux("/L").get(name, 1) for name in ("diffuse", "specular")}
+    assert told == {"diffuse": diffuse, "specular": specular}
+    assert scene.json.get("materials") == plain.json.get("materials")
+    assert scene.json.get("extensions") == plain.json.get("extensions")
+    assert scene.lux("/L").get("radiance") == plain.lux("/L").get("radiance")
+    assert not result.warned()
+
+
+def test_multipliers_that_nobody_can_carry_are_listed(export):
+    result = export(
+        ANIMATED
+        + """def RectLight "Fades" { float inputs:diffuse.timeSamples = { 1: 0.5, 5: 1 } }
+        def RectLight "Minus" { float inputs:specular = -2 }"""
+    )
+    scene = Gltf(result.path)
+    assert scene.lux("/Fades")["diffuse"] == 0.5 and scene.lux("/Minus")["specular"] == 0
+    assert {"animated inputs:diffuse", "inputs:specular is negative or not finite"} <= result.warned("lights")
 
 
 def test_a_connected_input_reads_its_constant_or_says_so(export):

@@ -217,11 +217,16 @@ def test_a_mesh_light_of_arnolds_over_time_and_by_its_radiance(gltf):
 
 @pytest.mark.parametrize(("body", "what"), [
     (f"float {ARNOLD}:camera = 0", "camera of a mesh light"),
-    (f"float {ARNOLD}:specular = 0", "inputs:specular"),
     (f"float {ARNOLD}:shadow_density = 0.5", "arnold attributes"),
 ])  # fmt: skip
 def test_what_a_mesh_light_of_arnolds_loses_is_told(export, body, what):
     assert what in export(arnolds(body)).warned("lights")
+
+
+def test_a_mesh_light_of_arnolds_has_its_own_multipliers(export):
+    body = f"float {ARNOLD}:specular = 0\n float {ARNOLD}:diffuse = 0.5\n float primvars:arnold:diffuse = 7"
+    lux = Gltf(export(arnolds(body)).path).lux("/M")
+    assert (lux["diffuse"], lux["specular"]) == (0.5, 0)
 
 
 def test_a_mesh_light_of_arnolds_is_filtered_by_its_own_graph(export):

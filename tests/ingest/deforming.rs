@@ -134,6 +134,25 @@ fn nodes_deform_a_mesh_each_in_its_own_way() {
     assert_eq!(pipeline::frames_of(&scene), (1..=25).collect::<Vec<_>>());
 }
 
+/// Weights of a mesh are those of its nodes, but for nodes that have their own.
+#[test]
+fn weights_of_a_mesh_deform_it_at_all_its_nodes() {
+    let mut file = dark(lamp());
+    target(&mut file, &[("POSITION", &[0.0, 0.0, 1.0].repeat(3))]);
+    let other = file.add("nodes", json!({"mesh": 0}));
+    let still = file.add("nodes", json!({"mesh": 0, "weights": [0.5]}));
+    let own = file.add("nodes", json!({"mesh": 0}));
+    file.json["scenes"][0]["nodes"] = json!([0, other, still, own]);
+    animate(&mut file, own, "weights", &[0.0, 1.0], &[0.0, -3.0], "LINEAR");
+    file.animate("/meshes/0/weights", &[0.0, 1.0], &[0.0, 2.0], "LINEAR");
+    let scene = load(&file);
+    assert_eq!(scene.notes, []);
+    let way = |instance| (places(&scene, instance, 1.0)[0] - places(&scene, instance, 0.0)[0]).z;
+    assert_eq!([way(0), way(1), way(2), way(3)], [2.0, 2.0, 0.0, -3.0]);
+    // Nodes that show it alike share it.
+    assert_eq!(scene.instances[0].mesh, scene.instances[1].mesh);
+}
+
 /// A bar that bends, gives light, and is carried along.
 fn glowing_bar() -> File {
     let mut file = bar();

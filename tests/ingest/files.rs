@@ -60,7 +60,11 @@ impl File {
 
     /// Animates what a pointer names.
     pub fn animate(&mut self, pointer: &str, times: &[f32], values: &[f32], how: &str) {
-        let shape = if pointer.ends_with("color") { "VEC3" } else { "SCALAR" };
+        let shape = match pointer.rsplit('/').next() {
+            Some("color" | "emissiveFactor") => "VEC3",
+            Some("scale") => "VEC2",
+            _ => "SCALAR",
+        };
         let (input, output) = (self.times(times), self.floats(values, shape));
         self.add(
             "animations",

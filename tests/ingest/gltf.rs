@@ -364,7 +364,7 @@ fn animations_become_channels() {
                 {"sampler": 1, "target": {"node": 0, "path": "rotation"}},
                 {"sampler": 2, "target": {"node": 0, "path": "scale"}},
                 {"sampler": 0, "target": {"path": "pointer", "extensions": {
-                    "KHR_animation_pointer": {"pointer": "/materials/0/emissiveFactor"}}}},
+                    "KHR_animation_pointer": {"pointer": "/materials/0/pbrMetallicRoughness/x"}}}},
             ],
         }),
     );
@@ -380,7 +380,11 @@ fn animations_become_channels() {
     assert_eq!((scales.interpolation, scales.values.len()), (Interpolation::Cubic, 6));
     assert_eq!(scene.pose_at(1.0).world(0).translation, Vec3::X.into());
     assert_eq!(scene.notes.len(), 1);
-    assert!(scene.notes[0].text.contains("/materials/0/emissiveFactor"), "{:?}", scene.notes);
+    assert!(
+        scene.notes[0].text.contains("/materials/0/pbrMetallicRoughness/x"),
+        "{:?}",
+        scene.notes
+    );
 }
 
 #[test]

@@ -2,12 +2,14 @@
 
 mod cameras;
 mod coat;
+mod cones;
 mod corpus;
 mod deforming;
 mod files;
 mod filters;
 mod fog;
 mod glass;
+mod glows;
 mod gltf;
 mod lenses;
 mod links;
@@ -23,6 +25,7 @@ mod posing_puppets;
 mod probe;
 mod real;
 mod refused;
+mod responses;
 mod shared;
 mod strengths;
 mod usd;

@@ -180,7 +180,7 @@ fn animations_of_lights_that_are_broken() {
         ),
         (
             |f| {
-                let pointer = "/extensions/KHR_lights_punctual/lights/0/range";
+                let pointer = "/extensions/KHR_lights_punctual/lights/0/extras/x";
                 f.animate(pointer, &[0.0], &[1.0], "STEP");
             },
             "this part of a light is not read",

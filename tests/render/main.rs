@@ -28,6 +28,7 @@ mod panes;
 mod ranges;
 mod real;
 mod references;
+mod responses;
 mod rooms;
 mod samples;
 mod seams;

@@ -80,6 +80,14 @@ fn amount(difference: &Difference, infinite: bool) -> String {
         Difference::Forced { after, .. } => {
             if after { "now forced" } else { "no longer forced" }.into()
         }
+        Difference::Response { before, after } => {
+            let told = ["diffuse", "specular"].into_iter().zip(before.into_iter().zip(after));
+            let told = told.filter(|(_, (before, after))| before != after);
+            let told = told.map(|(name, (before, after))| {
+                format!("{name} multiplier {} -> {}", short(before), short(after))
+            });
+            told.collect::<Vec<_>>().join(", ")
+        }
         Difference::LightLink { ref prims } => format!("lights {}", relinked(prims.as_ref())),
         Difference::ShadowLink { ref prims } => {
             format!("is shadowed by {}", relinked(prims.as_ref()))

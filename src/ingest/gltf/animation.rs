@@ -3,10 +3,12 @@
 //! A channel that cannot be read is left out; one whose keys are only partly good keeps those.
 
 use super::accessors::Accessor;
-use super::document::{Document, Node, Target, label};
+use super::cones::{Form, INNER, OUTER, RANGE};
+use super::document::label;
 use super::lenses::{self, YFOV, YMAG};
 use super::posing::Weights;
-use super::strengths::{self, COLOR, INTENSITY, Strength};
+use super::strengths::{self, INTENSITY, STRENGTH, Strength};
+use super::targets::{Moved, can_move, target, unread};
 use super::{Output, Source};
 use crate::ingest::error::Fault;
 use crate::math::color::Rgb;
@@ -21,33 +23,26 @@ use std::sync::Arc;
 /// How far the length of a key's quaternion may be from one without a note; small integers are coarse.
 const QUATERNION_TOLERANCE: f32 = 0.03;
 
-/// Where pointers to lights begin.
-const LIGHTS: &str = "/extensions/KHR_lights_punctual/lights/";
-
 /// The path of a channel that animates morph targets.
-const WEIGHTS: &str = "weights";
+pub(super) const WEIGHTS: &str = "weights";
 
 /// The channels of nodes, by their numbers in the file.
 pub(super) type Channels = BTreeMap<usize, Vec<Channel>>;
 
-/// What animations say of the nodes, cameras and lights of a file.
+/// What animations say of a file.
 pub(super) struct Animated {
     /// The channels of the nodes that have any.
     pub channels: Channels,
-    /// Of the nodes whose weights of morph targets are animated.
-    pub weights: BTreeMap<usize, Weights>,
+    /// Of the nodes and meshes whose weights of morph targets are animated.
+    pub weights: BTreeMap<Moved, Weights>,
     /// Of the cameras whose height is animated.
     pub lenses: BTreeMap<usize, Arc<LensKeys>>,
     /// Of the lights whose colour or intensity is animated.
     pub strengths: BTreeMap<usize, Keys<Rgb>>,
-}
-
-/// What a channel animates a part of, by its number in the file.
-#[derive(Clone, Copy, PartialEq, Eq, Hash)]
-enum Moved {
-    Node(usize),
-    Camera(usize),
-    Light(usize),
+    /// Of the materials whose emission is animated.
+    pub glows: BTreeMap<usize, Keys<Rgb>>,
+    /// Of the lights whose cone or range is animated.
+    pub forms: BTreeMap<usize, Form>,
 }
 
 /// The keys of a sampler that can be read.
@@ -62,13 +57,15 @@ pub(super) struct Track {
     mended: Option<&'static str>,
 }
 
-/// The channels and weights of every node of the file, the heights of its cameras and the strengths of its lights.
+/// The channels and weights of every node of the file, the heights of its cameras, the strengths of what shines, and the
+/// forms of its lights.
 pub(super) fn compile(source: &Source, output: &mut Output) -> Result<Animated, Fault> {
     let document = source.document;
     let timeline = output.scene.timeline;
     let mut channels = Channels::new();
     let (mut weights, mut lenses) = (BTreeMap::new(), BTreeMap::new());
-    let mut strengths: BTreeMap<usize, Strength> = BTreeMap::new();
+    let mut strengths: BTreeMap<Moved, Strength> = BTreeMap::new();
+    let mut forms: BTreeMap<usize, Form> = BTreeMap::new();
     let mut moved = HashSet::new();
     for (i, animation) in document.animations.iter().enumerate() {
         let object = label("animation", i, animation.name.as_deref());
@@ -84,13 +81,8 @@ pub(super) fn compile(source: &Source, output: &mut Output) -> Result<Animated, 
                 continue;
             }
             if moved.contains(&(moves, path)) {
-                let what = match moves {
-                    Moved::Node(node) => label("node", node, None),
-                    Moved::Camera(camera) => label("camera", camera, None),
-                    Moved::Light(light) => label("light", light, None),
-                };
                 let text = format!("only the first animation of its {path} is read");
-                output.notes.add(moves.category(), what, text);
+                output.notes.add(moves.category(), moves.label(), text);
                 continue;
             }
             let sampler = animation.samplers.get(row.sampler.value());
@@ -112,13 +104,17 @@ pub(super) fn compile(source: &Source, output: &mut Output) -> Result<Animated, 
                     let put = match moves {
                         Moved::Camera(camera) => lenses::height(path, &track, values)
                             .map(|lens| _ = lenses.insert(camera, lens)),
-                        Moved::Light(light) => {
-                            strengths.entry(light).or_default().put(path, &track, values)
+                        Moved::Light(light) if matches!(path, OUTER | INNER | RANGE) => {
+                            forms.entry(light).or_default().put(path, &track, values)
                         }
-                        Moved::Node(node) if path == WEIGHTS => {
-                            weights.insert(node, Weights::of(&track, values, timeline));
+                        Moved::Light(_) | Moved::Material(_) => {
+                            strengths.entry(moves).or_default().put(path, &track, values)
+                        }
+                        Moved::Node(_) | Moved::Mesh(_) if path == WEIGHTS => {
+                            weights.insert(moves, Weights::of(&track, values, timeline));
                             Ok(())
                         }
+                        Moved::Mesh(_) => Ok(()),
                         Moved::Node(node) => {
                             let own = channel(path, &mut track, values);
                             channels.entry(node).or_default().push(own);
@@ -142,37 +138,8 @@ pub(super) fn compile(source: &Source, output: &mut Output) -> Result<Animated, 
             }
         }
     }
-    let strengths = strengths::compile(strengths, source, output)?;
-    Ok(Animated { channels, weights, lenses, strengths })
-}
-
-impl Moved {
-    fn category(self) -> Category {
-        match self {
-            Moved::Node(_) => Category::Animation,
-            Moved::Camera(_) => Category::Cameras,
-            Moved::Light(_) => Category::Lights,
-        }
-    }
-}
-
-/// Whether the file has such a part.
-fn can_move(document: &Document, moves: Moved, path: &str) -> bool {
-    match moves {
-        Moved::Node(node) => {
-            let can = |node: &Node| path == WEIGHTS || node.transform.matrix.is_none();
-            document.nodes.get(node).is_some_and(can)
-        }
-        Moved::Camera(camera) if path == YFOV => {
-            document.cameras.get(camera).is_some_and(|camera| camera.perspective.is_some())
-        }
-        // One that is both is read as perspective.
-        Moved::Camera(camera) => {
-            document.cameras.get(camera).is_some_and(|camera| camera.perspective.is_none())
-                && document.beside.magnifications.get(camera).is_some_and(Option::is_some)
-        }
-        Moved::Light(light) => light < document.light_count(),
-    }
+    let [strengths, glows] = strengths::compile(strengths, source, output)?;
+    Ok(Animated { channels, weights, lenses, strengths, glows, forms })
 }
 
 /// How many bytes the keys of a channel take.
@@ -184,52 +151,6 @@ pub(super) fn byte_length(channel: &Channel) -> u64 {
         Channel::Translation(keys) | Channel::Scale(keys) => of(keys),
         Channel::Rotation(keys) => of(keys),
     }
-}
-
-/// What a channel moves and which part of it, directly or by a pointer.
-fn target(target: &Target) -> Option<(Moved, &'static str)> {
-    let parts = ["translation", "rotation", "scale", WEIGHTS];
-    let part = |name: &str| parts.into_iter().find(|part| *part == name);
-    match &target.extensions.pointer {
-        Some(pointer) => {
-            let pointer = pointer.pointer.as_str();
-            if let Some(camera) = pointer.strip_prefix("/cameras/") {
-                let (camera, path) = camera.split_once('/')?;
-                let path = [YFOV, YMAG].into_iter().find(|part| *part == path)?;
-                return Some((Moved::Camera(camera.parse().ok()?), path));
-            }
-            if let Some(light) = pointer.strip_prefix(LIGHTS) {
-                let (light, path) = light.split_once('/')?;
-                let path = [COLOR, INTENSITY].into_iter().find(|part| *part == path)?;
-                return Some((Moved::Light(light.parse().ok()?), path));
-            }
-            let (node, path) = pointer.strip_prefix("/nodes/")?.split_once('/')?;
-            Some((Moved::Node(node.parse().ok()?), part(path)?))
-        }
-        None => Some((Moved::Node(target.node?.value()), part(&target.path)?)),
-    }
-}
-
-/// What an animation that is not read is of, and what is said of its kind.
-fn unread(target: &Target) -> (&str, Category, &'static str) {
-    let Some(pointer) = &target.extensions.pointer else {
-        return (&target.path, Category::Animation, "animation of shapes is not read");
-    };
-    let pointer = pointer.pointer.as_str();
-    let emits = pointer.contains("emissive");
-    let (category, text) = match pointer.split('/').nth(1) {
-        Some("materials") if emits => {
-            (Category::Lights, "animation of emission is not read; the light is constant")
-        }
-        Some("materials") => (Category::Materials, "animation of materials is not read"),
-        Some("cameras") => (Category::Cameras, "animation of this part of a lens is not read"),
-        Some("extensions") if pointer.contains("KHR_lights_punctual") => {
-            (Category::Lights, "animation of this part of a light is not read; it is constant")
-        }
-        Some("meshes") => (Category::Animation, "animation of shapes is not read"),
-        _ => (Category::Animation, "animation of this is not read"),
-    };
-    (pointer, category, text)
 }
 
 /// The keys of a track that can be read; else what is wrong with it.
@@ -251,7 +172,7 @@ fn track(
     let in_a_key = if interpolation == Interpolation::Cubic { 3 } else { 1 };
     let shape = match path {
         "rotation" => Type::Vec4,
-        WEIGHTS | YFOV | YMAG | INTENSITY => Type::Scalar,
+        WEIGHTS | YFOV | YMAG | INTENSITY | STRENGTH | OUTER | INNER | RANGE => Type::Scalar,
         _ => Type::Vec3,
     };
     let typed = values.component == ComponentType::F32 || values.normalized;

@@ -8,12 +8,13 @@ use super::materials::{Materials, uv_sets};
 use super::posing::{Arrays, Hung, Pose, Posed, Poses};
 use super::{Output, Source};
 use crate::ingest::error::Fault;
-use crate::scene::{Category, Mesh};
+use crate::math::color::Rgb;
+use crate::scene::{Category, Keys, Mesh};
 use glam::{Vec2, Vec3, Vec4};
 use gltf::json::mesh::{Mode, Primitive, Semantic};
 use gltf::json::validation::Checked;
 use gltf::json::{Index, Mesh as Row};
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 use std::rc::Rc;
 use std::sync::Arc;
 
@@ -46,8 +47,15 @@ pub(super) struct Vertices {
 }
 
 impl Meshes {
-    pub(super) fn new(source: &Source) -> Meshes {
-        Meshes { compiled: HashMap::new(), materials: Materials::new(source), thin: HashMap::new() }
+    /// Given the emission over time of materials of the file.
+    pub(super) fn new(source: &Source, glows: BTreeMap<usize, Keys<Rgb>>) -> Meshes {
+        let materials = Materials::new(source, glows);
+        Meshes { compiled: HashMap::new(), materials, thin: HashMap::new() }
+    }
+
+    /// The emission over time of a primitive of a mesh that was compiled, if it is animated.
+    pub(super) fn glow(&self, primitive: &Primitive) -> Option<&Keys<Rgb>> {
+        self.materials.glow(primitive.material?)
     }
 
     /// The scene's meshes for a mesh of the file in a pose.
@@ -104,7 +112,8 @@ impl Meshes {
     /// What notes about a mesh are about: its light, if any of it may emit.
     pub(super) fn category(&self, source: &Source, number: Index<Row>) -> Category {
         let primitives = &source.document.meshes[number.value()].primitives;
-        let may_emit = primitives.iter().any(|p| category(source, p) == Category::Lights);
+        let may_emit =
+            primitives.iter().any(|p| category(source, &self.materials, p) == Category::Lights);
         if may_emit { Category::Lights } else { Category::Geometry }
     }
 
@@ -116,7 +125,7 @@ impl Meshes {
         (poses, pose): (&Poses, &Pose),
         object: &str,
     ) -> Result<Option<(Mesh, Option<Hung>)>, Fault> {
-        let category = category(source, primitive);
+        let category = category(source, &self.materials, primitive);
         let Checked::Valid(mode @ (Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan)) =
             primitive.mode
         else {
@@ -251,13 +260,10 @@ impl Meshes {
 }
 
 /// What notes about a primitive are about: its light, if it may emit.
-fn category(source: &Source, primitive: &Primitive) -> Category {
-    let material = primitive.material.map(|material| source.document.get(material));
-    let emits = |material: &gltf::json::Material| material.emissive_factor.0 != [0.0; 3];
-    match material {
-        Some(material) if material.is_none_or(emits) => Category::Lights,
-        _ => Category::Geometry,
-    }
+fn category(source: &Source, materials: &Materials, primitive: &Primitive) -> Category {
+    let may_emit =
+        |number| source.document.get(number).is_none_or(|row| materials.may_emit(row, number));
+    if primitive.material.is_some_and(may_emit) { Category::Lights } else { Category::Geometry }
 }
 
 /// Triangles of a list, strip or fan, wound the same way (glTF 2.0, 3.7.2.1).

@@ -1,6 +1,7 @@
 //! Nodes, parents first, and what stands at them.
 
 use super::animation::{self, Animated, Channels};
+use super::cones::{self, Form};
 use super::document::{Node as Row, Real, Transform, UsdFog, UsdLux, label, usd_path};
 use super::filters::FilterTable;
 use super::geometry::{Compiled, Meshes};
@@ -8,11 +9,14 @@ use super::lights::{self, Placed};
 use super::links::LinkTable;
 use super::posing::{Hung, Pose, Poses};
 use super::profiles::Profiles;
+use super::responses::{self, ResponseTable};
 use super::{Output, Source, cameras, fog, instancing};
 use crate::ingest::error::Fault;
 use crate::ingest::paths::{PrimPaths, component};
 use crate::math::color::Rgb;
-use crate::scene::{Category, Channel, Instance, Keys, LensKeys, Light, Links, Node, Trs};
+use crate::scene::{
+    Category, Channel, Instance, Keys, LensKeys, Light, Links, Node, Response, Trs,
+};
 use glam::{DAffine3, DMat4, DQuat, DVec3};
 use gltf::json::{Index, Mesh};
 use std::collections::{BTreeMap, HashMap};
@@ -49,6 +53,8 @@ struct Walk<'a> {
     lenses: BTreeMap<usize, Arc<LensKeys>>,
     /// By light of the file.
     strengths: BTreeMap<usize, Keys<Rgb>>,
+    /// By light of the file.
+    forms: BTreeMap<usize, Form>,
     /// For each node of the file where it was placed first.
     placed: Vec<Option<u32>>,
     meshes: Meshes,
@@ -58,6 +64,7 @@ struct Walk<'a> {
     paths: PrimPaths,
     links: LinkTable,
     filters: FilterTable,
+    responses: ResponseTable,
     profiles: Profiles,
     /// For each node of the scene, whether neither it nor an ancestor ever scales unevenly.
     uniform: Vec<bool>,
@@ -65,19 +72,22 @@ struct Walk<'a> {
 
 /// Compiles the nodes of the file's scene and everything at them.
 pub(super) fn compile(source: &Source, output: &mut Output) -> Result<(), Fault> {
-    let Animated { channels, weights, lenses, strengths } = animation::compile(source, output)?;
+    let Animated { channels, weights, lenses, strengths, glows, forms } =
+        animation::compile(source, output)?;
     let mut walk = Walk {
         source,
         poses: Poses::new(source, output, &channels, weights)?,
         channels,
         lenses,
         strengths,
+        forms,
         hanging: Vec::new(),
         placed: vec![None; source.document.nodes.len()],
-        meshes: Meshes::new(source),
+        meshes: Meshes::new(source, glows),
         paths: PrimPaths::with_room(source.document.nodes.len()),
         links: LinkTable::default(),
         filters: FilterTable::default(),
+        responses: ResponseTable::default(),
         profiles: Profiles::default(),
         uniform: Vec::new(),
     };
@@ -114,6 +124,7 @@ pub(super) fn compile(source: &Source, output: &mut Output) -> Result<(), Fault>
     }
     walk.hang(output)?;
     mem::take(&mut walk.filters).finish(output);
+    mem::take(&mut walk.responses).finish(output);
     walk.links.finish(output)
 }
 
@@ -188,6 +199,7 @@ impl Walk<'_> {
         self.filters.add(output, &row.extras, node, object)?;
         let lux = UsdLux::of(&row.extras, object)?;
         let filters = self.filters.of_light(output, lux.as_ref(), object)?;
+        let response = responses::of_light(lux.as_ref(), object)?;
         let links = Links { membership, ..self.links.of_light(lux.as_ref(), object)? };
         if let Some(group) = lux.as_ref().and_then(|lux| lux.group.as_ref()) {
             let bytes = size_of::<(u32, String)>() + group.len();
@@ -197,17 +209,16 @@ impl Walk<'_> {
         let mut values = lights::values(lux.as_ref(), object)?;
         let shaping = self.profiles.shaping(self.source, output, lux.as_ref(), object)?;
         let told = (lux.as_ref(), shaping);
-        let mut light = lights::of_node(self.source, output, number, told, node, object)?
+        let of_file = (number, &self.forms);
+        let mut light = lights::of_node(self.source, output, of_file, told, node, object)?
             .map(|light| Light { values: values.take().map(Box::new), ..light });
         if let Some(light) = &mut light {
             lights::animate(self.source, output, number, light, &self.strengths)?;
         }
         let has_light = light.is_some();
-        if has_light {
-            self.links.add_light(output, links)?;
-            self.filters.add_light(output, filters)?;
+        if let Some(light) = light {
+            self.put_light(output, number, light, (links, filters, response))?;
         }
-        output.scene.lights.extend(light);
         let forced = lux.as_ref().is_some_and(|lux| lux.force);
         let document = self.source.document;
         let instances = document.beside.instances.get(&number);
@@ -226,8 +237,18 @@ impl Walk<'_> {
         }
         let (lux, values) = (lux.as_ref(), values.as_ref());
         let visibility = lights::visibility(lux);
-        let placed =
-            Placed { lux, shaping, values, forced, visibility, links, filters, has_light, object };
+        let placed = Placed {
+            lux,
+            shaping,
+            values,
+            forced,
+            visibility,
+            links,
+            filters,
+            response,
+            has_light,
+            object,
+        };
         let pose = self.poses.of(self.source, output, (number, row), mesh)?;
         let Some(instances) = instances else {
             if pose.is_skinned() && self.placed[number] != Some(node) {
@@ -261,6 +282,33 @@ impl Walk<'_> {
         Ok(())
     }
 
+    /// Puts a light at its node: as many as it has cones and ranges over time, all but the first at nodes of their own.
+    fn put_light(
+        &mut self,
+        output: &mut Output,
+        number: usize,
+        light: Light,
+        (links, filters, response): (Links, Option<u32>, Response),
+    ) -> Result<(), Fault> {
+        let above = light.node;
+        let parts = cones::split(self.source, output, number, light, &self.forms)?;
+        for (i, (frame, light)) in parts.into_iter().enumerate() {
+            let node = match i {
+                0 => above,
+                _ => {
+                    let path =
+                        format!("{}[shaping {frame}]", output.scene.nodes[above as usize].path);
+                    self.push(output, &path, Some(above), (Trs::default(), Vec::new()))?
+                }
+            };
+            self.links.add_light(output, links)?;
+            self.filters.add_light(output, filters)?;
+            self.responses.add_light(output, response)?;
+            output.scene.lights.push(Light { node, ..light });
+        }
+        Ok(())
+    }
+
     /// Puts a mesh at a node of the scene: as a sphere light if it stands for one.
     fn put_mesh(
         &mut self,
@@ -277,9 +325,12 @@ impl Walk<'_> {
                 && material.emission_texture.is_none()
             {
                 let sphere = lights::sphere(material, radius, node, placed);
-                let values = placed.copy_values(output)?;
+                let primitives = &self.source.document.meshes[mesh.value()].primitives;
+                let glow = primitives.first().and_then(|first| self.meshes.glow(first));
+                let values = placed.copy_values(output, glow)?;
                 self.links.add_light(output, placed.links)?;
                 self.filters.add_light(output, placed.filters)?;
+                self.responses.add_light(output, placed.response)?;
                 output.scene.lights.push(Light { values, ..sphere });
                 return Ok(());
             }
@@ -306,7 +357,7 @@ impl Walk<'_> {
             let Placed { shaping, forced, visibility, links, .. } = *placed;
             let bytes = size_of::<Instance>() + 2 * path.len();
             output.budget.take(bytes as u64, || placed.object.to_string())?;
-            let values = placed.copy_values(output)?;
+            let values = placed.copy_values(output, self.meshes.glow(&row.primitives[i]))?;
             if values.is_some() && output.scene.material_of(mesh).is_none() {
                 let text = "its light varies, but its mesh has no material; dark";
                 output.notes.add(Category::Lights, placed.object, text);
@@ -316,6 +367,7 @@ impl Walk<'_> {
             let membership = self.links.of_primitive(output, primitive, above, placed.object)?;
             self.links.add_instance(output, Links { membership, ..links })?;
             self.filters.add_instance(output, placed.filters)?;
+            self.responses.add_instance(output, placed.response)?;
             if let Some(hung) = hung {
                 let bytes = size_of::<Hanging>() as u64;
                 output.budget.take(bytes, || placed.object.to_string())?;

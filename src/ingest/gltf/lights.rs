@@ -1,13 +1,14 @@
 //! Lights that are not meshes: `KHR_lights_punctual`, and what `extras.usdLux` adds.
 
+use super::cones::{self, Form};
 use super::document::{UsdLux, UsdValues, label, reals};
 use super::{Output, Source};
 use crate::ingest::error::Fault;
 use crate::ingest::image::{self, Coding};
 use crate::math::color::Rgb;
 use crate::scene::{
-    Category, Interpolation, Keys, Light, LightKind, Links, Material, Shaping, Texture, Visibility,
-    Wrap,
+    Category, Interpolation, Keys, Light, LightKind, Links, Material, Response, Shaping, Texture,
+    Visibility, Wrap,
 };
 use gltf::json::extensions::scene::khr_lights_punctual::{Light as Row, Type};
 use gltf::json::validation::Checked;
@@ -30,6 +31,8 @@ pub(super) struct Placed<'a> {
     pub links: Links,
     /// The number of the filters of the node's light.
     pub filters: Option<u32>,
+    /// How much of the node's light surfaces reflect.
+    pub response: Response,
     /// Whether a light has the node's path already.
     pub has_light: bool,
     pub object: &'a str,
@@ -49,19 +52,25 @@ impl Placed<'_> {
         }
     }
 
-    /// A copy of the values for one more light.
-    pub(super) fn copy_values(&self, output: &mut Output) -> Result<Option<Box<Keys<Rgb>>>, Fault> {
-        let bytes = self.values.map_or(0, |keys| keys.times_s.len() * size_of::<(f32, Rgb)>());
+    /// A copy of the values for one more light, or else of the emission over time of its material.
+    pub(super) fn copy_values(
+        &self,
+        output: &mut Output,
+        glow: Option<&Keys<Rgb>>,
+    ) -> Result<Option<Box<Keys<Rgb>>>, Fault> {
+        let values = self.values.or(glow);
+        let bytes = values.map_or(0, |keys| keys.times_s.len() * size_of::<(f32, Rgb)>());
         output.budget.take(bytes as u64, || self.object.to_string())?;
-        Ok(self.values.cloned().map(Box::new))
+        Ok(values.cloned().map(Box::new))
     }
 }
 
-/// The light at a node, other than its meshes; constant. One that cannot be read is left out.
+/// The light at a node, other than its meshes; constant. One that cannot be read is left out. The forms are what is animated
+/// of the cones and ranges of lights.
 pub(super) fn of_node(
     source: &Source,
     output: &mut Output,
-    number: usize,
+    (number, forms): (usize, &BTreeMap<usize, Form>),
     (lux, shaping): (Option<&UsdLux>, Option<Shaping>),
     node: u32,
     object: &str,
@@ -92,6 +101,7 @@ pub(super) fn of_node(
     }
     let object = label("light", index.value(), row.name.as_deref());
     let mut note = |text: String| output.notes.add(Category::Lights, &*object, text);
+    let row = &cones::opened(forms, index.value(), row);
     let Some(kind) = punctual(row, shaping, angle, &mut note) else { return Ok(None) };
     let is_distant = matches!(kind, LightKind::Distant { .. });
     let range_m = row.range.filter(|range| *range > 0.0 && range.is_finite() && !is_distant);
@@ -150,7 +160,7 @@ fn punctual(
 }
 
 /// The cone of a spot. Equal angles are a hard edge; some programs write angles that only 64 bits tell apart.
-fn cone(row: &Row, note: &mut impl FnMut(String)) -> Option<Shaping> {
+pub(super) fn cone(row: &Row, note: &mut impl FnMut(String)) -> Option<Shaping> {
     let (inner, outer) = match &row.spot {
         Some(spot) => (spot.inner_cone_angle, spot.outer_cone_angle),
         None => {

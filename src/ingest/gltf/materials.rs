@@ -9,28 +9,42 @@ use super::textures::Textures;
 use super::{Output, Source, coat, glass, glossiness};
 use crate::ingest::image::{Coding, MISSING_REFLECTANCE};
 use crate::math::color::Rgb;
-use crate::scene::{AlphaMode, Category, Material};
+use crate::scene::{AlphaMode, Category, Keys, Material};
 use gltf::json::material::AlphaMode as RowAlphaMode;
 use gltf::json::texture::Info;
 use gltf::json::validation::Checked;
 use gltf::json::{Index, Material as Row};
 use std::cell::Cell;
+use std::collections::BTreeMap;
 
 /// The materials that were compiled, by their number in the file.
 pub(super) struct Materials {
     compiled: Vec<Option<u32>>,
     textures: Textures,
     glossy: glossiness::Computed,
+    /// Emission over time, by number in the file; of those that were compiled, what can be read.
+    glows: BTreeMap<usize, Keys<Rgb>>,
 }
 
 impl Materials {
-    pub(super) fn new(source: &Source) -> Materials {
+    pub(super) fn new(source: &Source, glows: BTreeMap<usize, Keys<Rgb>>) -> Materials {
         let compiled = vec![None; source.document.materials.len()];
         Materials {
             compiled,
             textures: Textures::default(),
             glossy: glossiness::Computed::default(),
+            glows,
         }
+    }
+
+    /// The emission over time of a material of the file, if it is animated.
+    pub(super) fn glow(&self, number: Index<Row>) -> Option<&Keys<Rgb>> {
+        self.glows.get(&number.value())
+    }
+
+    /// Whether a material of the file may emit, as far as can be told without its texture.
+    pub(super) fn may_emit(&self, row: &Row, number: Index<Row>) -> bool {
+        row.emissive_factor.0 != [0.0; 3] || self.glow(number).is_some()
     }
 
     /// The scene's number of a material of the file; `None` if it is not there, which is noted.
@@ -123,7 +137,8 @@ impl Materials {
         self.add_textures(source, output, number, &object, &mut material);
         if let Some(extension) = extensions.others.get(coat::NAME) {
             material.coat = coat::compile(&mut self.textures, source, output, extension, &object);
-            if material.coat.is_some() && material.emits() {
+            let shines = material.emits() || self.glows.contains_key(&number);
+            if material.coat.is_some() && shines {
                 let text = "its coat does not darken its light";
                 output.notes.add(Category::Lights, &*object, text);
             }
@@ -151,20 +166,21 @@ impl Materials {
         material: &mut Material,
     ) {
         let row = &source.document.materials[number];
-        let strength = row.extensions.as_ref().and_then(|e| e.emissive_strength.as_ref());
-        let strength = strength.map_or(1.0, |strength| strength.emissive_strength.0);
-        let factor = Rgb::from(row.emissive_factor.0);
+        let (factor, strength) = emission(row);
         let emission = factor.max(Rgb::ZERO) * strength;
         let mut note = |text: String| output.notes.add(Category::Lights, object, text);
         if !emission.is_finite() || !factor.is_finite() || strength < 0.0 {
             note("its light is negative, or too strong for a 32-bit number; left out".into());
+            self.glows.remove(&number);
             return;
         }
         if factor.min_element() < 0.0 {
             note("its emissive colour is negative in part; that part is left out".into());
         }
         // Without any emission its texture is not decoded.
-        let texture = row.emissive_texture.as_ref().filter(|_| emission.max_element() > 0.0);
+        let glow = self.glows.get(&number).into_iter().flat_map(|glow| &glow.values);
+        let shines = glow.chain([&emission]).any(|value| value.max_element() > 0.0);
+        let texture = row.emissive_texture.as_ref().filter(|_| shines);
         let texture =
             texture.map(|info| self.textures.texture_use(source, output, info, Coding::Srgb));
         match texture.transpose() {
@@ -175,6 +191,7 @@ impl Materials {
             Err(problem) => {
                 let text = format!("{problem}; its light is left out");
                 output.notes.add(Category::Lights, object, text);
+                self.glows.remove(&number);
             }
         }
     }
@@ -237,6 +254,13 @@ impl Materials {
             (material.specular_color_texture, _) = texture(color.as_ref(), Coding::Srgb, instead);
         }
     }
+}
+
+/// The factor and the strength of a material's emission.
+pub(super) fn emission(row: &Row) -> (Rgb, f32) {
+    let strength = row.extensions.as_ref().and_then(|e| e.emissive_strength.as_ref());
+    let strength = strength.map_or(1.0, |strength| strength.emissive_strength.0);
+    (row.emissive_factor.0.into(), strength)
 }
 
 /// The texture sets that a material's textures are looked up by.

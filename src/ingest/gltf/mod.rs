@@ -16,8 +16,9 @@
 //! | `instancing`, `geometry`, `attributes` | meshes |
 //! | `posing` | skins and morph targets |
 //! | `materials`, `glossiness`, `coat`, `glass`, `textures` | surfaces |
-//! | `lights`, `fog`, `cameras`, `lenses`, `strengths`, `animation` | what they say |
-//! | `links`, `filters` | which lights light what, and what is in their way |
+//! | `lights`, `fog`, `cameras`, `lenses` | what they say |
+//! | `animation`, `targets`, `strengths`, `cones`, `key_table` | what moves and what varies |
+//! | `links`, `filters`, `responses` | which lights light what, what is in their way, how much is reflected |
 
 mod accessors;
 mod animation;
@@ -25,6 +26,7 @@ mod attributes;
 mod buffers;
 mod cameras;
 mod coat;
+mod cones;
 mod container;
 mod document;
 mod extensions;
@@ -36,13 +38,16 @@ mod glass;
 mod glossiness;
 mod hierarchy;
 mod instancing;
+mod key_table;
 mod lenses;
 mod lights;
 mod links;
 mod materials;
 mod posing;
 mod profiles;
+mod responses;
 mod strengths;
+mod targets;
 mod textures;
 
 use super::budget::Budget;

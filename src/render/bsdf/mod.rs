@@ -33,6 +33,7 @@ pub mod albedo;
 mod coat;
 pub mod ggx;
 mod glass;
+mod parts;
 #[cfg(test)]
 mod tests;
 

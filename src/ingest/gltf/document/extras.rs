@@ -78,6 +78,8 @@ pub(in crate::ingest::gltf) struct UsdLux {
     pub group: Option<String>,
     #[serde(default)]
     pub filters: Vec<String>,
+    pub diffuse: Option<Real>,
+    pub specular: Option<Real>,
     #[serde(rename = "lightLink")]
     pub light_link: Option<u64>,
     #[serde(rename = "shadowLink")]

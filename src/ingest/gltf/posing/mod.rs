@@ -5,7 +5,8 @@
 //!
 //! - A vertex is moved by the morph targets first, then by the joints: by the mean, by its weights, of what each joint's
 //!   global transform makes of the inverse bind matrix.
-//! - Weights of morph targets are those of the node's animation at the first frame, else the node's, else the mesh's.
+//! - Weights of morph targets are those of the node's animation at the first frame, else the node's, else those of the
+//!   mesh's animation, else the mesh's.
 //! - The transform of a skinned mesh's node has no meaning. The mesh is *hung* at a node that its joints have in
 //!   common, and its vertices are in that node's space; so it is carried as a whole by whatever moves there. Where the
 //!   joints never move against each other, that is the deepest common one. Else the mesh
@@ -33,6 +34,7 @@ use super::animation::Channels;
 use super::attributes::Attributes;
 use super::document::{Node, label, morph_targets};
 use super::geometry::Vertices;
+use super::targets::Moved;
 use super::{Output, Source};
 use crate::ingest::error::Fault;
 use crate::scene::{Category, Deformation, Mesh, Shape};
@@ -46,8 +48,8 @@ use std::collections::BTreeMap;
 /// What poses the meshes of a file.
 pub(super) struct Poses {
     rig: Rig,
-    /// Of the nodes whose animation gives them.
-    weights: BTreeMap<usize, Weights>,
+    /// Of the nodes and meshes whose animations give them.
+    weights: BTreeMap<Moved, Weights>,
 }
 
 /// How a mesh is posed at a node. Meshes that are posed alike are one.
@@ -57,8 +59,8 @@ pub(super) struct Pose {
     skin: Option<usize>,
     /// The bits of the weights of its morph targets at the first frame; none if all are zero, now and later.
     weights: Vec<u32>,
-    /// The node whose animation changes them later.
-    animated: Option<usize>,
+    /// The node or mesh whose animation changes them later.
+    animated: Option<Moved>,
 }
 
 /// Where a skinned mesh hangs.
@@ -92,7 +94,7 @@ impl Poses {
         source: &Source,
         output: &mut Output,
         channels: &Channels,
-        weights: BTreeMap<usize, Weights>,
+        weights: BTreeMap<Moved, Weights>,
     ) -> Result<Poses, Fault> {
         Ok(Poses { rig: Rig::new(source, output, channels)?, weights })
     }
@@ -105,15 +107,21 @@ impl Poses {
         (number, node): (usize, &Node),
         mesh: Index<Row>,
     ) -> Result<Pose, Fault> {
+        let from_mesh = Moved::Mesh(mesh.value());
         let mesh = &source.document.meshes[mesh.value()];
         let mut pose = Pose::default();
         if mesh.primitives.iter().any(is_bound) {
             pose.skin = node.skin().map(|skin| skin.value());
         }
         if mesh.primitives.iter().any(|primitive| morph_targets(primitive) > 0) {
-            let animated = self.weights.get(&number);
+            // A node's own weights take the place of the mesh's.
+            let mut by = Moved::Node(number);
+            if !self.weights.contains_key(&by) && node.weights().is_none() {
+                by = from_mesh;
+            }
+            let animated = self.weights.get(&by);
             let varies = animated.is_some_and(|weights| !weights.keys.is_empty());
-            pose.animated = varies.then_some(number);
+            pose.animated = varies.then_some(by);
             let first = animated.map(|weights| &weights.first);
             let weights = first.or(node.weights()).or(mesh.weights.as_ref());
             let is_needed =
@@ -171,7 +179,7 @@ impl Poses {
         let is_morphed = pose.animated.is_some() && !targets.is_empty();
         let deforms = is_morphed || hung.is_some_and(|hung| hung.deforms);
         let weights = match pose.animated.filter(|_| is_morphed) {
-            Some(node) => self.weights[&node].keys.clone(),
+            Some(by) => self.weights[&by].keys.clone(),
             None => weights::constant(&weights),
         };
         let skin = bound.map(|bound| bound.skin);
