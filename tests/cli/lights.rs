@@ -111,3 +111,12 @@ fn a_path_without_a_light_is_named() {
     }
     assert_eq!(shot.names(), [SCENE]);
 }
+
+#[test]
+fn a_scene_without_light_is_said_to_be_black() {
+    let mut shot = Shot::still();
+    let note = "nothing in the scene gives light";
+    assert!(!shot.render("-o a.exr").ends(0).err.contains(note));
+    shot.edit(|scene| scene["nodes"][1] = serde_json::json!({"name": "lamp"}));
+    shot.render("-o a.exr").ends(0).complains(&[note, SCENE]);
+}

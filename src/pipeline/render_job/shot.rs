@@ -6,7 +6,7 @@ use crate::pipeline::read::read_scene;
 use crate::pipeline::{ASPECT, Event, ShotTrees, Watch, frames_of, look, option};
 use crate::render::RenderSettings;
 use crate::render::frames::Frames;
-use crate::scene::{Camera, Scene};
+use crate::scene::{Camera, Instance, Material, Scene};
 
 /// A scene with its camera, and what is to be rendered of it.
 pub(super) struct Shot {
@@ -28,6 +28,10 @@ impl Shot {
         let aspect = job.size.map_or(ASPECT, |(width, height)| width as f32 / height as f32);
         let found = look(&mut scene, &job.view, aspect)?;
         found.note.into_iter().for_each(note);
+        if !gives_light(&scene) {
+            let source = scene.source.display();
+            note(format!("{source}: nothing in the scene gives light; pictures are black"));
+        }
         let camera = found.camera;
         let shape = || option::size_of(camera.aspect.unwrap_or(ASPECT), RenderJob::HEIGHT);
         let (width, height) = job.size.unwrap_or_else(shape);
@@ -46,6 +50,14 @@ impl Shot {
             tree_file_bytes: trees.file_length(),
         }
     }
+}
+
+/// Whether it has lights or surfaces that glow, at some time.
+fn gives_light(scene: &Scene) -> bool {
+    let glows = |instance: &Instance| {
+        instance.values.is_some() || scene.material_of(instance.mesh).is_some_and(Material::emits)
+    };
+    !scene.lights.is_empty() || scene.instances.iter().any(glows)
 }
 
 /// The frames that were asked for, or the first. Tells what may not be what the user means.
