@@ -67,6 +67,7 @@ def contact_sheet(frames: list[Path], columns: int) -> Image.Image:
         print(f"note: the pictures differ in size: {'; '.join(told)}", file=sys.stderr)
     cell_width = max(t.width for t in thumbnails) + GAP
     cell_height = max(t.height for t in thumbnails) + GAP
+    columns = min(columns, len(thumbnails))
     rows = math.ceil(len(thumbnails) / columns)
     sheet = Image.new("RGB", (columns * cell_width + GAP, rows * cell_height + GAP))
     for i, thumbnail in enumerate(thumbnails):

@@ -118,3 +118,13 @@ def test_what_dead_writers_left_is_removed_and_what_lives_stays(folder: Path) ->
         fcntl.flock(file, fcntl.LOCK_EX)
         sheet(folder, "0.png")
         assert alive.exists() and elsewhere.exists() and not dead.exists()
+
+
+def test_it_is_no_wider_than_its_pictures(folder: Path) -> None:
+    def width(*names: str) -> int:
+        sheet(folder, *names)
+        with Image.open(folder / "sheet.png") as picture:
+            return picture.width
+
+    one, two, three = width("0.png"), width("0.png", "1.png"), width("0.png", "1.png", "2.png")
+    assert two - one == three - two > 0 and one < 2 * (two - one)
