@@ -67,7 +67,6 @@ def contact_sheet(frames: list[Path], columns: int) -> Image.Image:
         print(f"note: the pictures differ in size: {'; '.join(told)}", file=sys.stderr)
     cell_width = max(t.width for t in thumbnails) + GAP
     cell_height = max(t.height for t in thumbnails) + GAP
-    columns = min(columns, len(thumbnails))
     rows = math.ceil(len(thumbnails) / columns)
     sheet = Image.new("RGB", (columns * cell_width + GAP, rows * cell_height + GAP))
     for i, thumbnail in enumerate(thumbnails):
@@ -108,7 +107,7 @@ def digest_of(sheet: Path) -> str | None:
 def main() -> int:
     arguments = parsed()
     try:
-        return run(arguments.frames, arguments.output, arguments.columns)
+        return run(arguments.frames, arguments.output, min(arguments.columns, len(arguments.frames)))
     except OSError as error:
         print(f"error: {error.filename or arguments.output}: {error.strerror or error}", file=sys.stderr)
     return 1
