@@ -27,13 +27,12 @@ impl Profiles {
 
     /// The profile of a light that is not infinite, in a pose.
     pub fn of_light(&self, scene: &Scene, pose: &Pose, source: LightSource) -> Profile {
-        let filters = match source {
-            LightSource::Mesh { instance, .. } => scene.light_filters.of_instance(instance),
-            LightSource::Light(row) => scene.light_filters.of_light(row),
-        };
-        let response = match source {
-            LightSource::Mesh { instance, .. } => scene.light_responses.of_instance(instance),
-            LightSource::Light(row) => scene.light_responses.of_light(row),
+        let (of_filters, of_responses) = (&scene.light_filters, &scene.light_responses);
+        let (filters, response) = match source {
+            LightSource::Mesh { instance, .. } => {
+                (of_filters.of_instance(instance), of_responses.of_instance(instance))
+            }
+            LightSource::Light(row) => (of_filters.of_light(row), of_responses.of_light(row)),
         };
         let profile = self.unfiltered(scene, pose, source);
         let pattern = with_filters(profile.pattern, scene, pose, filters);

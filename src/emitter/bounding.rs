@@ -2,8 +2,8 @@
 //!
 //! Energy is the luminance of the peak radiant intensity: `I` of a point, `L A` of a triangle,
 //! `L pi r^2` of a sphere. With a photometric profile it is the mean over directions that counts and not the peak, which
-//! may be anywhere. Of a light with multipliers it is what the larger of them leaves. It is never quite zero: an emitter that a transform or the shape of its mesh has
-//! flattened, or that is dark in this frame, keeps its place in the tree.
+//! may be anywhere. Of a light with multipliers it is what the larger of them leaves. It is never quite zero: an emitter
+//! that a transform or the shape of its mesh has flattened, or that is dark in this frame, keeps its place in the tree.
 
 use super::mesh_light::MeshLight;
 use super::posed::PosedEmitters;

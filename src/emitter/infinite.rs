@@ -124,7 +124,7 @@ impl Skies {
 
 impl InfiniteLight<'_> {
     /// An estimate of the irradiance on a surface with this normal (zero: in any direction), lux. It is 0
-    /// only where no light arrives, or nothing reflects it. It competes with the importance of the tree.
+    /// only where no light arrives. It competes with the importance of the tree.
     pub fn importance(&self, normal: Vec3) -> f64 {
         self.effect * self.illuminance(normal)
     }

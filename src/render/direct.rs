@@ -38,6 +38,12 @@ pub enum FoundByReflection {
     Everything,
 }
 
+/// What gives the light that was picked, a row of the scene.
+enum Owner {
+    Instance(u32),
+    Light(u32),
+}
+
 impl Integrator<'_> {
     /// Whether a reflected ray may find light, hidden or not.
     pub(super) fn may_find_light(&self, origin: Vec3, direction: Vec3) -> bool {
@@ -52,17 +58,20 @@ impl Integrator<'_> {
     #[inline]
     pub(super) fn filtered(&self, light: Picked, point: Vec3, source: Source) -> Rgb {
         let Some(filters) = self.filters else { return Rgb::ONE };
+        match self.owner(light) {
+            Owner::Instance(row) => filters.of_instance(row, point, source),
+            Owner::Light(row) => filters.of_light(row, point, source),
+        }
+    }
+
+    #[inline]
+    fn owner(&self, light: Picked) -> Owner {
         match light {
             Picked::Emitter(emitter) => match self.emitters.emitters.place_of(emitter) {
-                EmitterPlace::Triangle { instance, .. } => {
-                    filters.of_instance(instance, point, source)
-                }
-                EmitterPlace::Light(row) => filters.of_light(row, point, source),
+                EmitterPlace::Triangle { instance, .. } => Owner::Instance(instance),
+                EmitterPlace::Light(row) => Owner::Light(row),
             },
-            Picked::Beside(row) => {
-                let light = self.infinite[row as usize].light;
-                filters.of_light(light as u32, point, source)
-            }
+            Picked::Beside(row) => Owner::Light(self.infinite[row as usize].light as u32),
         }
     }
 
@@ -70,12 +79,9 @@ impl Integrator<'_> {
     #[inline]
     fn response(&self, light: Picked) -> Option<Response> {
         let responses = self.responses?;
-        Some(match light {
-            Picked::Emitter(emitter) => match self.emitters.emitters.place_of(emitter) {
-                EmitterPlace::Triangle { instance, .. } => responses.of_instance(instance),
-                EmitterPlace::Light(row) => responses.of_light(row),
-            },
-            Picked::Beside(row) => responses.of_light(self.infinite[row as usize].light as u32),
+        Some(match self.owner(light) {
+            Owner::Instance(row) => responses.of_instance(row),
+            Owner::Light(row) => responses.of_light(row),
         })
     }
 

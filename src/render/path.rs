@@ -266,10 +266,8 @@ impl Integrator<'_> {
             }
             let Receiver { point, normal } = vertex.receiver;
             let how = *self.picker.splitting(bounce);
-            let diffuse_share = match self.responses {
-                Some(_) => vertex.reflection.diffuse_share(next.wi),
-                None => Rgb::ZERO,
-            };
+            let share = |_| vertex.reflection.diffuse_share(next.wi);
+            let diffuse_share = self.responses.map_or(Rgb::ZERO, share);
             let bsdf_pdf = next.pdf;
             before = Some(Origin { wanted, how, point, normal, bsdf_pdf, diffuse_share });
             origin = vertex.anchor.origin_toward(next.wi);

@@ -9,6 +9,9 @@ use super::Scene;
 use crate::math::color::Rgb;
 use std::collections::BTreeMap;
 
+/// A light that no surface reflects still lights fog, so it must be picked now and then.
+const LEAST_EFFECT: f32 = 1.0 / 16.0;
+
 /// The multipliers of a light, at least 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Response {
@@ -27,6 +30,13 @@ impl Default for Response {
 impl Response {
     /// That of a light which is reflected as it is.
     pub const PLAIN: Response = Response { diffuse: 1.0, specular: 1.0 };
+
+    /// How many times the light counts where lights are picked: as often as it is multiplied at most, but not less than
+    /// [`LEAST_EFFECT`]. It is the same with and without fog, which a render may put in after the tree was published.
+    #[inline]
+    fn effect(self) -> f32 {
+        self.diffuse.max(self.specular).max(LEAST_EFFECT)
+    }
 
     /// What is reflected of a light, given what would be without multipliers, and the diffuse part of that.
     #[inline]
@@ -79,13 +89,12 @@ impl LightResponses {
 }
 
 impl Scene {
-    /// How many times a light counts where lights are picked: as often as it is multiplied at most. 0 if nothing shows it
-    /// but a look at it.
+    /// How many times a light counts where lights are picked.
     #[inline]
     pub fn effect_of_light(&self, light: u32) -> f32 {
         match self.light_responses.is_empty() {
             true => 1.0,
-            false => self.effect(self.light_responses.of_light(light)),
+            false => self.light_responses.of_light(light).effect(),
         }
     }
 
@@ -94,12 +103,7 @@ impl Scene {
     pub fn effect_of_instance(&self, instance: u32) -> f32 {
         match self.light_responses.is_empty() {
             true => 1.0,
-            false => self.effect(self.light_responses.of_instance(instance)),
+            false => self.light_responses.of_instance(instance).effect(),
         }
-    }
-
-    fn effect(&self, response: Response) -> f32 {
-        let in_fog = if self.medium.is_some() { 1.0 } else { 0.0 };
-        response.diffuse.max(response.specular).max(in_fog)
     }
 }

@@ -120,3 +120,17 @@ fn a_scene_without_light_is_said_to_be_black() {
     shot.edit(|scene| scene["nodes"][1] = serde_json::json!({"name": "lamp"}));
     shot.render("-o a.exr").ends(0).complains(&[note, SCENE]);
 }
+
+/// What a render puts in must not be what trees are built of.
+#[test]
+fn a_published_tree_serves_renders_with_fog() {
+    let mut shot = Shot::still();
+    shot.edit(|scene| {
+        let lux = serde_json::json!({"type": "MeshLight", "diffuse": 0.25, "specular": 0});
+        scene["nodes"][1]["extras"]["usdLux"] = lux;
+    });
+    shot.candelabra(&format!("build {SCENE} -o shot.ltree")).ends(0);
+    for fog in ["", "--fog 0.1"] {
+        shot.render(&format!("--tree shot.ltree {fog} -o a.exr")).ends(0);
+    }
+}

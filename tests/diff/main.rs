@@ -3,5 +3,6 @@
 mod edits;
 mod laws;
 mod links;
+mod responses;
 mod shapes;
 mod street;

@@ -47,7 +47,7 @@ pub fn with_widest(task: impl WithLanes) {
         fn with_avx2(task: impl WithLanes) {
             task.run::<avx2::One>();
         }
-        // Processors that have the first have all others, but a virtual machine may hide some.
+        // Nearly all processors with the first have the others.
         if std::arch::is_x86_feature_detected!("avx2")
             && std::arch::is_x86_feature_detected!("fma")
             && std::arch::is_x86_feature_detected!("bmi1")
