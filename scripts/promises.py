@@ -4,7 +4,7 @@
     python3 scripts/promises.py target/release SCENE... [--res 96x54] [--depth 1] [--table FILE]
 
 For each scene a converged picture is rendered, in two halves with seeds of their own. Then:
-told over true error at 16, 64 and 256 samples; the true error where 0.1, 0.05 and 0.02 are asked for, and that of
+told over true error at 16, 64 and 256 samples, of frames and of blocks of 8x8 pixels (the layer `error`); the true error where 0.1, 0.05 and 0.02 are asked for, and that of
 as many samples in every pixel, with the seconds of processor time of both: all of the program, that is with reading the
 scene and choosing the knob of splitting. The measure is that of
 `src/render/noise`: the root mean square of the difference in the logarithm of luminance plus the grey floor.
@@ -23,6 +23,9 @@ import OpenEXR
 WEIGHTS = (0.2126, 0.7152, 0.0722)
 
 
+BLOCK = 8
+
+
 class Shot:
     """A scene at a size, rendered by a program."""
 
@@ -31,7 +34,7 @@ class Shot:
         self.folder = Path(folder)
 
     def render(self, *options, aov="beauty"):
-        """The luminance, the event of the frame, and the seconds of processor time."""
+        """The luminance, the event of the frame, and the seconds of processor time; with `aov="error"` that layer, too."""
         picture = self.folder / "picture.exr"
         command = [*self.command, "-o", str(picture), "--progress", "json", "--aov", aov, *map(str, options)]
         started = processor_seconds()
@@ -41,7 +44,7 @@ class Shot:
         done = next(event for event in events if event["event"] == "frame-done")
         channels = OpenEXR.File(str(picture), separate_channels=True).channels()
         light = sum(weight * channels[name].pixels.astype(float) for weight, name in zip(WEIGHTS, "RGB"))
-        return light, done, seconds
+        return (light, done, seconds, channels["error"].pixels.astype(float)) if aov == "error" else (light, done, seconds)
 
 
 def processor_seconds():
@@ -61,13 +64,24 @@ class Reference:
         if kept:
             np.save(kept, np.array(self.halves))
 
-    def error(self, light, grey):
-        """The error of a picture, without that of the reference."""
+    def squared_errors(self, light, grey):
+        """Of each pixel, without the noise of the reference, and which pixels have noise."""
         a, b = (np.log(half + grey) for half in self.halves)
         middle = np.log(sum(self.halves) / 2 + grey)
         squares = (np.log(light + grey) - middle) ** 2 - (a - b) ** 2 / 4
         noisy = (self.halves[0] != light) | (self.halves[1] != light)
+        return squares, noisy
+
+    def error(self, light, grey):
+        """The squared error of a picture: the mean over the pixels that have noise."""
+        squares, noisy = self.squared_errors(light, grey)
         return squares[noisy].mean()
+
+
+def blocks(values):
+    """Sums over blocks of 8x8 pixels, the last ones of what is left."""
+    rows = np.add.reduceat(values, range(0, values.shape[0], BLOCK), axis=0)
+    return np.add.reduceat(rows, range(0, values.shape[1], BLOCK), axis=1)
 
 
 def root(squares):
@@ -78,12 +92,22 @@ def measure(shot, reference, seeds, errors, told_at):
     grey = shot.render("--error", 10, "--spp", 8)[1]["noise"]["grey"]
     rows = {"told": {}, "asked": {}, "grey": grey}
     for count in told_at:
-        told, true = [], []
+        told, true, of_blocks = [], [], 0
         for seed in range(seeds):
-            light, done, _ = shot.render("--spp", count, "--grey", grey, "--seed", seed)
+            light, done, _, errors = shot.render("--spp", count, "--grey", grey, "--seed", seed, aov="error")
             told.append(done["noise"]["error"] ** 2)
             true.append(reference.error(light, grey))
-        rows["told"][count] = (root(told), root(true))
+            squares, noisy = reference.squared_errors(light, grey)
+            of_blocks += np.array([blocks(errors**2 * noisy), blocks(squares * noisy)])
+        block_told, block_true = of_blocks[:, blocks(noisy * 1.0) >= BLOCK]
+        ratios = np.sqrt(block_told / np.maximum(block_true, 1e-12))
+        # Standard error of the ratio of sums over blocks (Cochran 1977, section 6); half of it for its root.
+        spread = block_told - block_told.sum() / block_true.sum() * block_true
+        unsure = 0.5 * math.sqrt((spread**2).sum()) / block_true.sum()
+        rows["told"][count] = {
+            "told": root(told), "true": root(true), "unsure": unsure, "blocks": list(np.quantile(ratios, (0.05, 0.5, 0.95))),
+            "blocks_within": float(np.mean((ratios > 0.8) & (ratios < 1.25))),
+        }
     for asked in errors:
         true, even, told, counts, seconds, even_seconds = [], [], [], [], [], []
         for seed in range(seeds if asked > 0.04 else 1):
@@ -127,8 +151,14 @@ def main():
             kept = options.references and options.references / name
             reference = Reference(shot, options.reference, kept)
             results[Path(scene).stem] = rows = measure(shot, reference, options.seeds, options.errors, options.counts)
-        for count, (told, true) in rows["told"].items():
-            print(f"{Path(scene).stem:16} {count:4} samples: told {told:.4f}, true {true:.4f}, ratio {told / true:.3f}")
+        for count, row in rows["told"].items():
+            low, middle, high = row["blocks"]
+            print(
+                f"{Path(scene).stem:16} {count:4} samples: told {row['told']:.4f}, true {row['true']:.4f}, ratio "
+                f"{row['told'] / row['true']:.3f} +- {row['unsure']:.3f}; blocks {low:.2f}, {middle:.2f}, {high:.2f} (5, 50, 95 %), "
+                f"{100 * row['blocks_within']:.0f} % within 0.8 to 1.25",
+                flush=True,
+            )
         for asked, row in rows["asked"].items():
             print(
                 f"{Path(scene).stem:16} {asked} asked: told {row['told']:.4f}, true {row['true']:.4f}; "

@@ -34,7 +34,10 @@ import time
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
-FEATURES = ("textures", "fog", "motion", "domes", "instances", "splitting", "range", "glossy", "transmission")
+FEATURES = (
+    *("textures", "fog", "motion", "domes", "instances", "splitting", "range", "glossy", "transmission"),
+    *("links", "filters", "multipliers", "profiles", "visibility"),
+)
 ALL = "all"
 ALLOWED = 1.02
 FLOOR, FACES, POINTS = 48, 3000, 1000

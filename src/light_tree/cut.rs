@@ -21,6 +21,7 @@ use super::sampling::FrameTree;
 use super::splitting::{Rounded, SplitTest, Splitting, allot};
 use super::veil::Cell;
 use super::viewer::Viewer;
+use crate::math::built_in;
 
 /// What was picked.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -226,8 +227,9 @@ impl FrameTree<'_> {
     /// The importance of everything in the tree; 0 if nothing of it can arrive.
     fn weight_of_root<V: Viewer>(&self, place: &Place<V>) -> f64 {
         // What is hidden, not linked or measured is known of the root's children, not of the root.
-        let is_known = (V::IS_LINKED && self.links.is_some()) || self.fields.is_some();
-        let may_be = self.veils.is_some() || is_known;
+        let is_known =
+            (V::IS_LINKED && self.links.is_some()) || (built_in::PROFILES && self.fields.is_some());
+        let may_be = (built_in::VISIBILITY && self.veils.is_some()) || is_known;
         let known = if may_be { self.weigh(place) } else { None };
         let known = known.filter(|weighed| weighed.veils.is_some() || is_known);
         known.map_or_else(

@@ -73,6 +73,7 @@ impl FrameTree<'_> {
         let group = self.groups.get(place.at as usize)?;
         let (mut importances, spreads) = group.weigh(&place.viewer);
         if V::IS_ORIENTED
+            && built_in::PROFILES
             && let Some(fields) = &self.fields
         {
             fields.weigh(self, place, &mut importances);
@@ -80,14 +81,17 @@ impl FrameTree<'_> {
         if built_in::INSTANCES && place.unit != 1.0 {
             importances.iter_mut().for_each(|importance| *importance *= place.unit);
         }
-        let veils = self.veils.filter(|_| place.viewer.cell() != Cell::NONE).map(|veils| {
-            let weights = veils.weights(place.viewer.cell(), place.at);
-            let weights = weights.unwrap_or([place.veil; WIDTH]);
-            for (lane, weight) in weights.into_iter().enumerate() {
-                importances[lane] *= f64::from(weight);
-            }
-            weights
-        });
+        let veils = self
+            .veils
+            .filter(|_| built_in::VISIBILITY && place.viewer.cell() != Cell::NONE)
+            .map(|veils| {
+                let weights = veils.weights(place.viewer.cell(), place.at);
+                let weights = weights.unwrap_or([place.veil; WIDTH]);
+                for (lane, weight) in weights.into_iter().enumerate() {
+                    importances[lane] *= f64::from(weight);
+                }
+                weights
+            });
         if V::IS_LINKED
             && let Some(links) = &self.links
         {

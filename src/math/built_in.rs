@@ -22,3 +22,13 @@ pub const RANGE: bool = !cfg!(feature = "without-range");
 pub const GLOSSY: bool = !cfg!(feature = "without-glossy");
 /// Light that passes through glass.
 pub const TRANSMISSION: bool = !cfg!(feature = "without-transmission");
+/// Links of lights to what they light, and to what casts their shadows.
+pub const LINKS: bool = !cfg!(feature = "without-links");
+/// Light filters.
+pub const FILTERS: bool = !cfg!(feature = "without-filters");
+/// Lights whose diffuse and specular light is multiplied.
+pub const MULTIPLIERS: bool = !cfg!(feature = "without-multipliers");
+/// What was learned of hidden lights: tables of veils.
+pub const VISIBILITY: bool = !cfg!(feature = "without-visibility");
+/// Profiles of lights, IES.
+pub const PROFILES: bool = !cfg!(feature = "without-profiles");

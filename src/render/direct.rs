@@ -6,6 +6,7 @@ use super::rays::{Anchor, Caster, Hit, Transmitted};
 use super::vertex::{Inside, Vertex};
 use crate::emitter::{EmitterPlace, Source};
 use crate::light_tree::{Picked, Splitting};
+use crate::math::built_in;
 use crate::math::color::{Rgb, luminance};
 use crate::math::random::hash;
 use crate::scene::Response;
@@ -57,7 +58,7 @@ impl Integrator<'_> {
     /// The share of a light's light from a source that its filters let through to a point.
     #[inline]
     pub(super) fn filtered(&self, light: Picked, point: Vec3, source: Source) -> Rgb {
-        let Some(filters) = self.filters else { return Rgb::ONE };
+        let Some(filters) = self.filters.filter(|_| built_in::FILTERS) else { return Rgb::ONE };
         match self.owner(light) {
             Owner::Instance(row) => filters.of_instance(row, point, source),
             Owner::Light(row) => filters.of_light(row, point, source),
@@ -78,7 +79,7 @@ impl Integrator<'_> {
     /// The multipliers of a light, unless no light has any.
     #[inline]
     fn response(&self, light: Picked) -> Option<Response> {
-        let responses = self.responses?;
+        let responses = self.responses.filter(|_| built_in::MULTIPLIERS)?;
         Some(match self.owner(light) {
             Owner::Instance(row) => responses.of_instance(row),
             Owner::Light(row) => responses.of_light(row),
@@ -195,7 +196,8 @@ impl Integrator<'_> {
     /// Samples a picked light as seen from a point. Infinite lights are sampled on the side of the normal
     /// only, or all around if it is zero.
     pub fn incoming(&self, light: Picked, point: Vec3, normal: Vec3, u: Vec2) -> Option<Incoming> {
-        let shadow_set = self.links.and_then(|links| links.shadow_set(light));
+        let links = self.links.filter(|_| built_in::LINKS);
+        let shadow_set = links.and_then(|links| links.shadow_set(light));
         // Light that passes what a reflected ray would hit is found by sampling alone.
         let by_reflection = shadow_set.is_none();
         let emitter = match light {

@@ -38,6 +38,8 @@ pub enum Aov {
     Cryptomatte,
     /// variance.RGB: variance of the mean in the beauty
     Variance,
+    /// error: how far the pixel is off, as --error means it: told by its neighbours
+    Error,
     /// sampleCount: samples that the mean is of
     SampleCount,
 }
@@ -114,6 +116,7 @@ pub fn layers_of(aovs: &[Aov], float_beauty: bool, groups: &[String]) -> Vec<Lay
                 (0..super::cryptomatte::LEVELS).for_each(|number| add(&level(number), RGBA));
             }
             Aov::Variance => add("variance", RGB),
+            Aov::Error => add("", &["error"]),
             Aov::SampleCount => add("", &["sampleCount"]),
         }
     }

@@ -49,7 +49,10 @@ impl Integrator<'_> {
             surface.frame.normal
         };
         let receiver = Receiver { point: hit.anchor.position, normal };
-        let class = self.links.map_or(ReceiverClass::ALL, |links| links.of_instance(instance));
+        let class = self
+            .links
+            .filter(|_| built_in::LINKS)
+            .map_or(ReceiverClass::ALL, |links| links.of_instance(instance));
         let [here, beyond] = self.sides(hit, wo);
         Some(Vertex { anchor: hit.anchor, reflection, wo, receiver, here, beyond, class })
     }

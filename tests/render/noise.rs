@@ -144,6 +144,37 @@ fn what_is_told_of_the_noise_is_true() {
     }
 }
 
+/// The layer of errors tells the error of the frame, in any unit of light; nothing where there is no noise; and
+/// does not pretend to know it by one sample.
+#[test]
+fn the_layer_of_errors_tells_where_the_noise_is() {
+    let layer = |stage: &Stage, samples: u32| {
+        let set = stage.set();
+        let aovs = vec![Aov::Beauty, Aov::Error];
+        let studio = Studio { set: &set, settings: RenderSettings { aovs, ..settings() } };
+        let (_, frame) = studio.expose(3, &mut Uniform(samples));
+        let reference = studio.reference(1024);
+        let real = reference.compare(&luminances(&frame), Grey::of(reference.luminance())).error;
+        let layer: Vec<f64> = frame.buffers.channel("error").unwrap().map(f64::from).collect();
+        (layer, real)
+    };
+    let mut stage = court();
+    let (errors, real) = layer(&stage, 64);
+    let noisy: Vec<f64> = errors.iter().copied().filter(|error| *error > 0.0).collect();
+    let told = (noisy.iter().map(|error| error * error).sum::<f64>() / noisy.len() as f64).sqrt();
+    assert!((told / real - 1.0).abs() < 0.15, "{told} told, {real} true");
+    stage.scene.cameras[0].exposure_scale = 1e6;
+    let (brighter, _) = layer(&stage, 64);
+    for (own, same) in errors.iter().zip(brighter) {
+        assert!((own - same).abs() <= 1e-3 * own, "{own} {same}");
+    }
+    assert!(layer(&stage, 1).0.iter().all(|error| error.is_infinite()));
+    let mut sky = Stage::default();
+    sky.light(LightKind::Point { intensity_cd: Vec3::ONE }, at(DVec3::Y));
+    sky.look(DVec3::ZERO, DVec3::Z, 0.7);
+    assert!(layer(&sky, 64).0.iter().all(|error| *error == 0.0));
+}
+
 #[test]
 fn an_error_that_is_asked_for_is_reached() {
     let stage = court();

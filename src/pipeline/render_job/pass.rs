@@ -20,6 +20,7 @@ use crate::pipeline::{
 };
 use crate::render::beauty::Beauty;
 use crate::render::knob::{Aim, pilot};
+use crate::render::layers::Aov;
 use crate::render::noise::Grey;
 use crate::render::passes::ErrorGoal;
 use crate::render::{self, RenderDelegate, RenderSettings, Split};
@@ -189,6 +190,7 @@ impl<'a> Pass<'a> {
             Some(film) => film,
             None => blank()?,
         };
+        film.set_grey(grey);
         let leftover = checkpoint.as_ref().map(|own| own.path().to_path_buf());
         let mut control = FrameControl::new(
             &job.effort,
@@ -274,7 +276,8 @@ impl<'a> Pass<'a> {
     /// The grey floor of the shot, if the noise of its frames is looked at.
     fn grey(&mut self) -> Result<Option<Grey>, Trouble> {
         let effort = &self.job.effort;
-        if effort.grey.is_some() || !(effort.looks() || self.job.audit.is_some()) {
+        let is_shown = || self.shot.settings.aovs.contains(&Aov::Error);
+        if effort.grey.is_some() || !(effort.looks() || self.job.audit.is_some() || is_shown()) {
             return Ok(effort.grey);
         }
         let seen = frames_of_grey(&frames_of(&self.shot.scene));

@@ -2,7 +2,7 @@
 
 use super::super::buffers::{RenderBuffers, set_pixel};
 use super::super::layers::Aov;
-use super::super::noise::pool;
+use super::super::noise::{Estimate, Grey, Halves, pool};
 use super::super::parts::settle;
 use super::sums::{self, COVERED, Shown, pair, vector};
 use super::{Film, counts};
@@ -24,6 +24,8 @@ struct Pixel<'a> {
     covered: f64,
     /// Variance of the beauty.
     variance: DVec3,
+    /// Error of its luminance.
+    error: f64,
 }
 
 impl Film {
@@ -31,22 +33,21 @@ impl Film {
     pub(in super::super) fn develop(&self, shown: &Shown) -> RenderBuffers {
         let mut buffers = RenderBuffers::new(self.size, self.window, shown.layers.to_vec());
         let width = self.window.width() as usize;
-        let variance = match shown.layers.iter().any(|layer| layer.aov == Aov::Variance) {
-            true => self.variance(),
-            false => Vec::new(),
-        };
+        let is_shown = |aov| shown.layers.iter().any(|layer| layer.aov == aov);
+        let variance = if is_shown(Aov::Variance) { self.variance() } else { Vec::new() };
+        let error = if is_shown(Aov::Error) { self.error() } else { Vec::new() };
         buffers.rows_mut().enumerate().for_each(|(y, row)| {
             let mut values = Vec::new();
             for x in 0..width {
                 let at = y * width + x;
-                self.pixel(at, variance.get(at)).values(shown, &mut values);
+                self.pixel(at, variance.get(at), error.get(at)).values(shown, &mut values);
                 set_pixel(row, width, x, &values);
             }
         });
         buffers
     }
 
-    fn pixel(&self, at: usize, variance: Option<&DVec3>) -> Pixel<'_> {
+    fn pixel(&self, at: usize, variance: Option<&DVec3>, error: Option<&f64>) -> Pixel<'_> {
         let stride = self.layout.stride();
         let sums = &self.sums[at * stride..][..stride];
         let [a, b] = counts(sums, self.taken[at]).map(f64::from);
@@ -60,7 +61,23 @@ impl Film {
             count,
             covered: sums[COVERED].max(1.0),
             variance: variance.copied().unwrap_or_default(),
+            error: error.copied().unwrap_or_default(),
         }
+    }
+
+    /// The error of each pixel, told by its neighbours; infinite where there are less than two samples, of which nothing
+    /// can be told. Without a floor it is relative to that of this picture.
+    fn error(&self) -> Vec<f64> {
+        let halves = self.halves();
+        let own = || Grey::of(halves.iter().map(Halves::luminance));
+        let width = self.window.width() as usize;
+        let estimate = Estimate::of(&halves, width, self.grey.unwrap_or_else(own));
+        let told = |(pixel, halves): (usize, &Halves)| match halves.counts {
+            [0, _] | [_, 0] => f64::INFINITY,
+            _ if estimate.is_spoilt(pixel) => f64::INFINITY,
+            _ => estimate.error(pixel),
+        };
+        halves.iter().enumerate().map(told).collect()
     }
 
     /// The variance of each pixel's beauty, pooled over what is around it.
@@ -156,6 +173,7 @@ impl Pixel<'_> {
                     values.extend(&pairs.unwrap_or_default()[4 * own..][..4]);
                 }
                 Aov::Variance => values.extend(brief(self.variance).to_array()),
+                Aov::Error => values.push(self.error as f32),
                 Aov::SampleCount => values.push(self.taken as f32),
             }
         }

@@ -30,6 +30,8 @@ pub struct Film {
     window: Window,
     /// Factor on radiance.
     exposure_scale: f64,
+    /// What the layer of errors is relative to.
+    grey: Option<Grey>,
     layout: Layout,
     /// Of each pixel: samples taken.
     taken: Vec<u32>,
@@ -61,6 +63,7 @@ impl Film {
             size,
             window,
             exposure_scale: exposure_scale.into(),
+            grey: None,
             sums: vec![0.0; pixels * layout.stride()],
             layout,
             taken: vec![0; pixels],
@@ -68,6 +71,11 @@ impl Film {
             coverage: std::iter::repeat_with(Coverage::default).take(coverage).collect(),
             trace: TraceStats::default(),
         }
+    }
+
+    /// Makes the layer of errors relative to a floor. Without one it is that of the picture.
+    pub fn set_grey(&mut self, grey: Option<Grey>) {
+        self.grey = grey;
     }
 
     /// Which part of the picture this is.

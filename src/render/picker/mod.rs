@@ -170,7 +170,8 @@ impl<'a> LightPicker<'a> {
     /// Whether a light lights what something is wanted for.
     #[inline]
     fn lights(&self, wanted: &Wanted, light: Picked) -> bool {
-        self.links.as_ref().is_none_or(|links| links.lights(wanted.class, light))
+        !built_in::LINKS
+            || self.links.as_ref().is_none_or(|links| links.lights(wanted.class, light))
     }
 
     /// The tree that is picked from.
