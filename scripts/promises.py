@@ -94,11 +94,11 @@ def measure(shot, reference, seeds, errors, told_at):
     for count in told_at:
         told, true, of_blocks = [], [], 0
         for seed in range(seeds):
-            light, done, _, errors = shot.render("--spp", count, "--grey", grey, "--seed", seed, aov="error")
+            light, done, _, layer = shot.render("--spp", count, "--grey", grey, "--seed", seed, aov="error")
             told.append(done["noise"]["error"] ** 2)
             true.append(reference.error(light, grey))
             squares, noisy = reference.squared_errors(light, grey)
-            of_blocks += np.array([blocks(errors**2 * noisy), blocks(squares * noisy)])
+            of_blocks += np.array([blocks(layer**2 * noisy), blocks(squares * noisy)])
         block_told, block_true = of_blocks[:, blocks(noisy * 1.0) >= BLOCK]
         ratios = np.sqrt(block_told / np.maximum(block_true, 1e-12))
         # Standard error of the ratio of sums over blocks (Cochran 1977, section 6); half of it for its root.

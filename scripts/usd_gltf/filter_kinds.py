@@ -68,12 +68,17 @@ def kind_of(prim: Usd.Prim) -> str:
     return kind
 
 
+def is_filter(prim: Usd.Prim) -> bool:
+    """Whether a prim is a light filter, or one of Arnold's shaders that are."""
+    return str(prim.GetTypeName()).endswith("LightFilter") or kind_of(prim) in (BLOCKER, DECAY)
+
+
 def is_linked(prim: Usd.Prim) -> bool:
     """Whether a filter is for some geometry alone."""
     links = {p.GetBaseName(): p for p in prim.GetAuthoredPropertiesInNamespace("collection:filterLink")}
     root = links.pop("includeRoot", None)
-    links.pop("expansionRule", None)
-    return bool(links) or bool(root and not root.Get())
+    rule = links.pop("expansionRule", None)
+    return bool(links or (root and not root.Get()) or (rule and rule.Get() == Usd.Tokens.explicitOnly))
 
 
 def is_hidden(prim: Usd.Prim, code: float) -> bool:
@@ -158,8 +163,6 @@ class _Rod:
                 raise Lost(f"its {name.split(':')[-1]} is connected")
             if name not in known and name.split(":")[0] not in _NOT_OURS and attribute.Get(self.code) not in ("", None):
                 raise Lost(f"nobody knows its {name.split(':')[-1]}")
-        if is_linked(self.prim):
-            raise Lost("it is linked to some geometry alone")
 
 
 def _rod(rod: _Rod) -> dict:

@@ -7,7 +7,8 @@ names, all others are reported and leave the light as it is.
 | `arnold:light_decay` without near and far attenuation; `arnold:light_blocker` of density 0 | nothing | Arnold's user guide |
 | `LightFilter` without `lightFilter:shaderId`; one that is inactive or invisible | nothing | usdLux/schema.usda; hdPrman (light.cpp) |
 
-A filter link multiplies for some geometry alone. Then the filter is lost, unless it holds everything.
+A filter with a filter link multiplies for some geometry alone (`linking`). So a `PxrIntMultLightFilter` that has one stands at a
+node, too; it is not put into the light.
 """  # noqa: E501
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from collections.abc import Iterator
 from pxr import Sdf, Usd, UsdShade
 
 from .filter_kinds import BLOCKER, DECAY, Lost, carrier, combines, is_hidden, is_linked, kind_of, varying
+from .gltf_document import numbers
 from .light_attributes import LightAttributes, arnold_names_of
 from .light_networks import connected, graph_of
 from .stage import Frames, changes
@@ -41,7 +43,9 @@ class FilterReader:
         """`extras.usdLightFilter` of a filter, or why it has none."""
         if prim not in self._read:
             try:
-                self._read[prim] = carrier(prim, self.frames.first, self.meters_per_unit)
+                is_multiplier = kind_of(prim) == MULTIPLIER and is_linked(prim)
+                read = _linked_multiplier if is_multiplier else carrier
+                self._read[prim] = read(prim, self.frames.first, self.meters_per_unit)
             except Lost as lost:
                 self._read[prim] = str(lost)
         return self._read[prim]
@@ -52,8 +56,7 @@ class FilterReader:
 
     def carried(self, light: Usd.Prim, kind: str) -> list[Usd.Prim]:
         """The filters of a light that stand at nodes."""
-        others = (prim for prim in filters_of(light, self.frames.first) if prim.GetTypeName() != MULTIPLIER)
-        return [prim for prim in others if isinstance(self.of_light(prim, kind), dict)]
+        return [prim for prim in filters_of(light, self.frames.first) if isinstance(self.of_light(prim, kind), dict)]
 
 
 class LightFilters:
@@ -67,7 +70,7 @@ class LightFilters:
             if not prim.GetStage().GetPrimAtPath(target):
                 lost.append(f"{target} (it is not there)")
         for found in filters_of(prim, inputs.frames.first):
-            if found.GetTypeName() == MULTIPLIER and not _why_not(found):
+            if kind_of(found) == MULTIPLIER and not is_linked(found) and not _why_not(found):
                 self._multipliers.append(found)
                 continue
             read = reader.of_light(found, kind)
@@ -114,7 +117,7 @@ def filters_of(light: Usd.Prim, code: float) -> list[Usd.Prim]:
 
 def _why_lost(found: Usd.Prim, kind: str, code: float) -> str:
     """Why a light of some kind cannot have a filter, whatever that does; empty if it can."""
-    if found.GetTypeName() == MULTIPLIER:
+    if kind_of(found) == MULTIPLIER:
         return _why_not(found)
     if kind_of(found) == DECAY and kind in _PLACED_NOWHERE:
         return "its light is at no distance"
@@ -177,7 +180,14 @@ def _why_not(prim: Usd.Prim) -> str:
             return f"its {name} is {attribute.Get(Usd.TimeCode.EarliestTime())}"
         if name not in (*_READ, *_NEUTRAL, *_WITHOUT_MEANING) and words[0] in ("inputs", "ri"):
             return f"nobody knows its {name}"
-    return "it is linked to some geometry alone" if is_linked(prim) else ""
+    return ""
+
+
+def _linked_multiplier(prim: Usd.Prim, code: float, _meters_per_unit: float) -> dict:
+    factor = _multiplier(prim, code)
+    if not 0 <= factor < 1e30:
+        raise Lost(f"it multiplies by {factor:g}")
+    return {"type": "multiplier", "share": numbers([factor] * 3)}
 
 
 def _multiplier(prim: Usd.Prim, code: float) -> float:

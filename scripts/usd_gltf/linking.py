@@ -1,9 +1,13 @@
-"""Light linking and shadow linking: which geometry a light lights, and which casts shadows from it.
+"""Light linking and shadow linking: which geometry a light lights, and which casts shadows from it. Filter linking: for which
+geometry a light filter filters.
 
-UsdLux has a collection for each, `lightLink` and `shadowLink`; usd-core computes what they hold. A *link set* is what
-a collection holds of the geometry that is exported. Equal sets are one, and a set of everything is none, so a stage
+UsdLux has a collection for each, `lightLink`, `shadowLink` and `filterLink`; usd-core computes what they hold. A *link set* is
+what a collection holds of the geometry that is exported. Equal sets are one, and a set of everything is none, so a stage
 whose lights light everything exports nothing of this. The form in the file is in `src/ingest/carriers.md`. A light whose
 `shadow:enable` is off has a shadow link that holds nothing.
+
+All three collections hold everything where they do not say whether they do: `includeRoot` is true in UsdLux's schemas. usd-core
+does not know this of prims whose types it does not know, such as RenderMan's filters.
 
 Prims are asked for by their paths on the stage, those of instances by the paths of their proxies. What a
 PointInstancer places has two paths, the prototype's and the instancer's. A collection that names the prototype or
@@ -17,10 +21,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
-from functools import partial
 
 from pxr import Sdf, Usd, UsdGeom, UsdLux
 
+from .filter_kinds import is_filter
 from .light_inputs import SIZES, light_type
 from .mesh import MeshSource, Piece
 from .prim_tree import Prim
@@ -28,6 +32,7 @@ from .report import Notebook
 from .stage import PREDICATE
 
 _LINKS = ("lightLink", "shadowLink")
+_FILTER_LINK = "filterLink"
 
 Place = tuple[str, ...]
 """The path of a prim, and those of the PointInstancers that place it, the innermost first."""
@@ -45,9 +50,11 @@ class Linking:
         for prim, _ in _all(prims):
             if prim.light is not None and prim.light_path not in lights:
                 lights[prim.light_path] = self._queries_of(prim.light_path, prim.light.casts_shadows)
+        filters = {path: [self._query(path, _FILTER_LINK)] for prim, _ in _all(prims) for path in prim.filters}
         self._members: dict[Place, tuple[bool, ...]] = {}
         self._sets: list[int | None] = []
         self._lights: dict[str, list[int | None]] = {}
+        self._filters: dict[str, list[int | None]] = {}
         self._meshes: dict[tuple[int, tuple], MeshSource] = {}
         if not self._queries:
             return
@@ -55,11 +62,11 @@ class Linking:
             if _is_geometry(prim):
                 for path in (prim.path, *_parts(prim)):
                     self._member((path, *chain))
-        self._number_sets(lights)
+        self._number_sets(lights, filters)
 
     def node(self, prim: Prim, chain: Place) -> dict:
         """What the extras of a prim's node get, placed by a chain of PointInstancers."""
-        if not self._lights or not _is_geometry(prim):
+        if not (self._lights or self._filters) or not _is_geometry(prim):
             return {}
         outside = self._outside((prim.path, *chain))
         return {"usdLinks": self._said(outside)} if outside else {}
@@ -69,10 +76,15 @@ class Linking:
         numbers = self._lights.get(prim.light_path, ())
         return {link: number for link, number in zip(_LINKS, numbers, strict=False) if number is not None}
 
+    def filter(self, prim: Prim) -> dict:
+        """What the `usdLightFilter` extras of a filter get."""
+        number = self._filters.get(prim.path, [None])[0]
+        return {} if number is None else {_FILTER_LINK: number}
+
     def mesh(self, prim: Prim, chain: Place) -> MeshSource:
         """The mesh of a prim, whose parts carry the sets that they are in where those differ from the mesh's."""
         mesh = prim.mesh
-        if not self._lights or not _parts(prim):
+        if not (self._lights or self._filters) or not _parts(prim):
             return mesh
         own = self._outside((prim.path, *chain))
         parts = [_subset(prim, piece) for piece in mesh.pieces]
@@ -109,12 +121,12 @@ class Linking:
         if not _is_authored(prim, link):
             return -1
         collection = _collection(prim, link)
-        query = collection.ComputeMembershipQuery()
+        query, root = collection.ComputeMembershipQuery(), _is_usually_everything(collection)
         # Queries of expressions are equal to one another, whatever the expressions say.
         is_expression = not query.UsesPathExpansionRuleMap()
-        key = collection.ResolveCompleteMembershipExpression().GetText() if is_expression else query
+        key = (collection.ResolveCompleteMembershipExpression().GetText() if is_expression else query, root)
         if key not in self._number:
-            new = _Query(query)
+            new = _Query(query, root)
             self._number[key] = -1 if new.is_all else len(self._queries)
             if not new.is_all:
                 self._queries.append(new)
@@ -130,18 +142,22 @@ class Linking:
             self._members[place] = tuple(query.holds(paths) for query in self._queries)
         return self._members[place]
 
-    def _number_sets(self, lights: dict[str, list[int]]) -> None:
-        """Number the sets in the order of the lights that name them."""
+    def _number_sets(self, lights: dict[str, list[int]], filters: dict[str, list[int]]) -> None:
+        """Number the sets in the order of the lights, and then of the filters, that name them."""
         columns = list(zip(*self._members.values(), strict=True))
         numbers: dict[tuple, int] = {}
         self._sets = [None] * len(self._queries)
-        for of_light in lights.values():
-            for query in of_light:
+        for queries in (*lights.values(), *filters.values()):
+            for query in queries:
                 if query >= 0 and columns and not all(columns[query]):
                     self._sets[query] = numbers.setdefault(columns[query], len(numbers))
         self._count = len(numbers)
-        named = {path: [self._sets[q] if q >= 0 else None for q in of_light] for path, of_light in lights.items()}
-        self._lights = {path: sets for path, sets in named.items() if sets != [None, None]}
+        self._lights, self._filters = self._named(lights), self._named(filters)
+
+    def _named(self, queries: dict[str, list[int]]) -> dict[str, list[int | None]]:
+        """The numbers of the sets of queries, by path, where one is not of everything."""
+        named = {path: [self._sets[q] if q >= 0 else None for q in own] for path, own in queries.items()}
+        return {path: sets for path, sets in named.items() if any(number is not None for number in sets)}
 
     def _outside(self, place: Place) -> tuple[int, ...]:
         """The numbers of the sets that do not hold what stands at a place, ascending."""
@@ -193,22 +209,38 @@ def _parts(prim: Prim) -> list[str]:
 
 
 def _is_authored(light: Usd.Prim, link: str) -> bool:
-    """Whether a light says anything of a link; without, it is of everything."""
+    """Whether a light or a filter says anything of a link; without, it is of everything."""
     return bool(light.GetAuthoredPropertiesInNamespace(f"collection:{link}"))
 
 
 def _collection(light: Usd.Prim, link: str) -> Usd.CollectionAPI:
     api = UsdLux.LightAPI(light)
+    if link == _FILTER_LINK:
+        return UsdLux.LightFilter(light).GetFilterLinkCollectionAPI() or Usd.CollectionAPI(light, link)
     return api.GetLightLinkCollectionAPI() if link == "lightLink" else api.GetShadowLinkCollectionAPI()
 
 
-class _Query:
-    """What a collection holds."""
+def _is_usually_everything(collection: Usd.CollectionAPI) -> bool:
+    """Whether a collection does not say if it holds everything, and usd-core does not know that it then does."""
+    return collection.GetIncludeRootAttr().Get() is None and collection.GetExpansionRuleAttr().Get() != Usd.Tokens.explicitOnly
 
-    def __init__(self, query) -> None:
-        self.query = query
-        self.by_rules = query.UsesPathExpansionRuleMap()
+
+def _links_of(prim: Usd.Prim) -> Iterator[str]:
+    """The links that a light or a filter says anything of."""
+    links = _LINKS if light_type(prim) is not None else (_FILTER_LINK,) if is_filter(prim) else ()
+    return (link for link in links if _is_authored(prim, link))
+
+
+class _Query:
+    """What a collection holds. With `root` it holds everything that it does not exclude."""
+
+    def __init__(self, query, root: bool = False) -> None:
+        self.query, self.root = query, root
+        self.by_rules = root or query.UsesPathExpansionRuleMap()
         rules = dict(query.GetAsPathExpansionRuleMap()) if self.by_rules else {}
+        self.excluded = {path for path, rule in rules.items() if rule == Usd.Tokens.exclude}
+        if root:
+            rules = {Sdf.Path.absoluteRootPath: Usd.Tokens.expandPrims, **rules}
         self.is_all = rules == {Sdf.Path.absoluteRootPath: Usd.Tokens.expandPrims}
         self.named = frozenset(rules)
         """The paths that it names; none if it is an expression."""
@@ -217,13 +249,16 @@ class _Query:
         """Whether it holds what stands at a place."""
         path, *chain = place
         if not chain:
-            return self.query.IsPathIncluded(path)
+            return self._holds(path)
         if not self.by_rules:
-            return any(self.query.IsPathIncluded(at) for at in place)
+            return any(self._holds(at) for at in place)
         for at in (path, *chain[:-1]):
             if any(prefix in self.named for prefix in at.GetPrefixes()):
-                return self.query.IsPathIncluded(at)
-        return self.query.IsPathIncluded(chain[-1])
+                return self._holds(at)
+        return self._holds(chain[-1])
+
+    def _holds(self, path: Sdf.Path) -> bool:
+        return self.query.IsPathIncluded(path) or (self.root and self.excluded.isdisjoint(path.GetPrefixes()))
 
 
 class _Nothing:
@@ -241,9 +276,7 @@ class LinkSubsets:
         self.report = report
         self._named: set[Sdf.Path] = set()
         for prim in Usd.PrimRange(stage.GetPseudoRoot(), PREDICATE):
-            if light_type(prim) is None:
-                continue
-            for link in filter(partial(_is_authored, prim), _LINKS):
+            for link in _links_of(prim):
                 query = _Query(_collection(prim, link).ComputeMembershipQuery())
                 named = ((path, stage.GetPrimAtPath(path)) for path in query.named if path.IsPrimPath())
                 self._named.update(path for path, prim in named if prim and prim.IsA(UsdGeom.Subset))

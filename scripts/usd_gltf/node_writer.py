@@ -84,7 +84,7 @@ class NodeWriter:
         if prim.fog is not None:
             node["extras"]["usdFog"] = prim.fog
         if prim.filter is not None:
-            node["extras"]["usdLightFilter"] = prim.filter
+            node["extras"]["usdLightFilter"] = prim.filter | self.linking.filter(prim)
             self.report.count("light filters")
         node["extras"].update(self.linking.node(prim, chain))
         mesh = self.linking.mesh(prim, chain)

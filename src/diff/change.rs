@@ -108,6 +108,11 @@ pub enum Difference {
         /// Those of two scenes.
         prims: Option<Relinked>,
     },
+    /// For which prims its filters filter.
+    FilterLink {
+        /// The filters of two scenes that do so otherwise.
+        filters: Vec<RelinkedFilter>,
+    },
     /// How far it reaches.
     Range {
         /// Metres before; `None` is physical.
@@ -140,6 +145,15 @@ pub struct Relinked {
     pub lost: usize,
     /// The paths of the first few of them.
     pub lost_named: Vec<String>,
+}
+
+/// A light filter that filters for other prims than before.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct RelinkedFilter {
+    /// Its path.
+    pub path: String,
+    /// The prims that it filters for, or no longer.
+    pub prims: Relinked,
 }
 
 /// How far apart two versions of a light come in the course of time.
@@ -177,6 +191,7 @@ impl Difference {
             Difference::Response { .. } => "response",
             Difference::LightLink { .. } => "light_link",
             Difference::ShadowLink { .. } => "shadow_link",
+            Difference::FilterLink { .. } => "filter_link",
             Difference::Range { .. } => "range",
             Difference::OverTime { .. } => "over_time",
             Difference::Pattern => "pattern",

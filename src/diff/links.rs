@@ -1,11 +1,12 @@
-//! Which lights light other prims than before, or are shadowed by others.
+//! Which lights light other prims than before, are shadowed by others, or have filters that filter for others.
 //!
 //! Two scenes are compared by the prims that both have: a prim that is new is not gained. A tree file tells only which
 //! lights light the same, by their link numbers.
 
-use super::change::{Difference, Relinked};
+use super::change::{Difference, Relinked, RelinkedFilter};
 use super::light::{Light, Row};
 use super::scene_side::SceneSide;
+use crate::emitter::LightSource;
 use crate::light_tree::SameLinks;
 use crate::scene::Links;
 use std::cell::RefCell;
@@ -52,7 +53,30 @@ impl<'a> LinkChanges<'a> {
         let shadow = self.between([a.shadow, b.shadow]);
         let light = light.map(|prims| Difference::LightLink { prims: Some(prims) });
         let shadow = shadow.map(|prims| Difference::ShadowLink { prims: Some(prims) });
-        [light, shadow].into_iter().flatten().collect()
+        let filters = self.refiltered(scenes, [before, after]);
+        let filters = (!filters.is_empty()).then_some(Difference::FilterLink { filters });
+        [light, shadow, filters].into_iter().flatten().collect()
+    }
+
+    /// The filters that both versions of a light have, and that filter for other prims.
+    fn refiltered(
+        &self,
+        scenes: [&'a SceneSide<'a>; 2],
+        [before, after]: [&Light; 2],
+    ) -> Vec<RelinkedFilter> {
+        let path = |side: &SceneSide<'a>, row: u32| -> &'a str {
+            let node = side.scene.light_filters.all()[row as usize].node;
+            &side.scene.nodes[node as usize].path
+        };
+        let [old, new] = scenes;
+        let others = filters_of(new, after);
+        let relinked = filters_of(old, before).iter().filter_map(|&row| {
+            let path_of = path(old, row);
+            let other = *others.iter().find(|&&other| path(new, other) == path_of)?;
+            let sets = [(old, row), (new, other)].map(|(s, row)| s.scene.linking.of_filter(row));
+            Some(RelinkedFilter { path: path_of.to_owned(), prims: self.between(sets)? })
+        });
+        relinked.collect()
     }
 
     /// How two sets of the two scenes differ; `None` if they do not.
@@ -84,6 +108,18 @@ fn links_of(side: &SceneSide, light: &Light) -> Links {
     match light.row {
         Row::Near(row) => side.emitters.lights()[row as usize].links,
         Row::Infinite(row) => side.scene.linking.of_light(side.infinite_row(row)),
+    }
+}
+
+/// The rows of the filters of a light of a scene.
+fn filters_of<'a>(side: &'a SceneSide, light: &Light) -> &'a [u32] {
+    let filters = &side.scene.light_filters;
+    match light.row {
+        Row::Near(row) => match side.emitters.lights()[row as usize].source {
+            LightSource::Mesh { instance, .. } => filters.of_instance(instance),
+            LightSource::Light(row) => filters.of_light(row),
+        },
+        Row::Infinite(row) => filters.of_light(side.infinite_row(row)),
     }
 }
 

@@ -55,7 +55,7 @@ mod totals;
 mod tree_side;
 
 pub use card::{Kind, LightCard, Place};
-pub use change::{Apart, Change, Difference, Relinked, Verb};
+pub use change::{Apart, Change, Difference, Relinked, RelinkedFilter, Verb};
 pub use compare::{DiffOptions, compare};
 pub use folder::{FolderDiff, Outcome, Shot, compare_folders};
 pub use heat::{HeatCell, HeatMap};

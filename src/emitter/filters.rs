@@ -4,7 +4,7 @@
 //! may shine.
 
 use crate::math::color::Rgb;
-use crate::scene::{BlockerShape, FilterKind, LightFilters, Pose, Rod, Scene};
+use crate::scene::{BlockerShape, FilterKind, LightFilters, Linking, Pose, Rod, Scene};
 use glam::{DAffine3, DVec3, Vec3};
 
 /// Where light comes from.
@@ -16,9 +16,21 @@ pub enum Source {
     Direction(Vec3),
 }
 
+/// What light falls on.
+#[derive(Clone, Copy, Debug)]
+pub struct Lit {
+    /// The point, world space, metres.
+    pub point: Vec3,
+    /// The link sets that its surface, or the fog, is in: a row of [`Linking::memberships`]; `None` is every set.
+    pub membership: Option<u32>,
+}
+
 /// The filters of a scene, placed by a pose.
 pub struct PosedFilters<'a> {
     filters: &'a LightFilters,
+    linking: &'a Linking,
+    /// The link set that each filter is for; `None` is everything.
+    links: Vec<Option<u32>>,
     /// World space to each filter's own; `None` where that is flattened to nothing.
     to_local: Vec<Option<DAffine3>>,
 }
@@ -33,22 +45,31 @@ impl<'a> PosedFilters<'a> {
             let to_world = DAffine3 { matrix3: world.matrix3.as_dmat3(), translation };
             Some(to_world.inverse()).filter(DAffine3::is_finite)
         });
-        (!filters.is_empty()).then(|| PosedFilters { filters, to_local: to_local.collect() })
+        let linking = &scene.linking;
+        (!filters.is_empty()).then(|| PosedFilters {
+            filters,
+            linking,
+            links: (0..filters.all().len() as u32).map(|row| linking.of_filter(row)).collect(),
+            to_local: to_local.collect(),
+        })
     }
 
-    /// The share of a light's light from a source that gets to a point, world space, metres.
-    pub fn of_light(&self, light: u32, point: Vec3, source: Source) -> Rgb {
-        self.passing(self.filters.of_light(light), point, source)
+    /// The share of a light's light from a source that gets to what is lit.
+    pub fn of_light(&self, light: u32, at: Lit, source: Source) -> Rgb {
+        self.passing(self.filters.of_light(light), at, source)
     }
 
     /// The same of an instance's light.
-    pub fn of_instance(&self, instance: u32, point: Vec3, source: Source) -> Rgb {
-        self.passing(self.filters.of_instance(instance), point, source)
+    pub fn of_instance(&self, instance: u32, at: Lit, source: Source) -> Rgb {
+        self.passing(self.filters.of_instance(instance), at, source)
     }
 
-    fn passing(&self, rows: &[u32], point: Vec3, source: Source) -> Rgb {
+    fn passing(&self, rows: &[u32], Lit { point, membership }: Lit, source: Source) -> Rgb {
         let mut share = Rgb::ONE;
         for &row in rows {
+            if !self.linking.holds(self.links[row as usize], membership) {
+                continue;
+            }
             let to_local = self.to_local[row as usize].as_ref();
             share *= match &self.filters.all()[row as usize].kind {
                 FilterKind::Rod(rod) => {
@@ -59,6 +80,7 @@ impl<'a> PosedFilters<'a> {
                         to_local.is_some_and(|to| shape.is_met(&Way::between(to, point, source)));
                     if meets { *through } else { Rgb::ONE }
                 }
+                FilterKind::Multiplier(share) => *share,
                 FilterKind::Decay { near_m, far_m } => {
                     let distance = match source {
                         Source::Point(from) => f64::from(from.distance(point)),

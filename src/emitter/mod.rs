@@ -32,7 +32,7 @@ mod textured;
 mod triangle;
 
 pub use bounding::LightOverflow;
-pub use filters::{PosedFilters, Source};
+pub use filters::{Lit, PosedFilters, Source};
 pub use infinite::{InfiniteLight, InfiniteSample, Skies, infinite_lights};
 pub use mesh_light::MeshLight;
 pub use posed::{EmitterHit, LightSample, MeshPlace, PosedEmitters};

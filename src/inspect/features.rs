@@ -134,6 +134,8 @@ fn lights(needs: &Requirements, emitters: &Emitters) -> Vec<Feature> {
             .taking(if emitters.link_sets().is_empty() { 0 } else { 4 * emitters.lights().len() }),
         Feature::new("shadow links", needs.shadow_links)
             .with("rays to these lights ask each prim; reflected rays find none of their light"),
+        Feature::new("filter links", needs.filter_links)
+            .with("each light with such a filter asks what it lights"),
         Feature::new("textured mesh lights", needs.textured_mesh_lights)
             .used_by(
                 means.len(),

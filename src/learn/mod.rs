@@ -238,7 +238,7 @@ fn is_seen(
     u: Vec2,
     accept: &impl Fn(u32, u32, Vec2) -> bool,
 ) -> Option<bool> {
-    let incoming = integrator.incoming(light, vertex.receiver.point, vertex.receiver.normal, u)?;
+    let incoming = integrator.incoming(light, vertex.lit(), vertex.receiver.normal, u)?;
     let counts = vertex.lets_through(incoming.direction);
     counts.then(|| integrator.arriving(vertex, &incoming, accept).max_element() > 0.0)
 }

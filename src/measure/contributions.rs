@@ -112,9 +112,8 @@ fn contribution(
     if integrator.links.is_some_and(|links| !links.lights(vertex.class, light)) {
         return Contribution::default();
     }
-    let point = vertex.receiver.point;
     let at = |u: Vec2| {
-        let found = integrator.incoming(light, point, vertex.receiver.normal, u)?;
+        let found = integrator.incoming(light, vertex.lit(), vertex.receiver.normal, u)?;
         if !vertex.lets_through(found.direction) {
             return None;
         }

@@ -4,7 +4,7 @@ use super::path::{Integrator, PathScratch, TraceStats};
 use super::picker::{LightPick, PickScratch, Wanted};
 use super::rays::{Anchor, Caster, Hit, Transmitted};
 use super::vertex::{Inside, Vertex};
-use crate::emitter::{EmitterPlace, Source};
+use crate::emitter::{EmitterPlace, Lit, Source};
 use crate::light_tree::{Picked, Splitting};
 use crate::math::built_in;
 use crate::math::color::{Rgb, luminance};
@@ -55,13 +55,13 @@ impl Integrator<'_> {
         }
     }
 
-    /// The share of a light's light from a source that its filters let through to a point.
+    /// The share of a light's light from a source that its filters let through to what is lit.
     #[inline]
-    pub(super) fn filtered(&self, light: Picked, point: Vec3, source: Source) -> Rgb {
+    pub(super) fn filtered(&self, light: Picked, at: Lit, source: Source) -> Rgb {
         let Some(filters) = self.filters.filter(|_| built_in::FILTERS) else { return Rgb::ONE };
         match self.owner(light) {
-            Owner::Instance(row) => filters.of_instance(row, point, source),
-            Owner::Light(row) => filters.of_light(row, point, source),
+            Owner::Instance(row) => filters.of_instance(row, at, source),
+            Owner::Light(row) => filters.of_light(row, at, source),
         }
     }
 
@@ -158,8 +158,7 @@ impl Integrator<'_> {
             stats.light_picks += 1;
             stats.groups += u64::from(pick.weighed);
             let u = if several { another(u, salt, pick.light) } else { u };
-            let incoming =
-                self.incoming(pick.light, vertex.receiver.point, vertex.receiver.normal, u);
+            let incoming = self.incoming(pick.light, vertex.lit(), vertex.receiver.normal, u);
             let Some(incoming) = incoming else { return };
             let reflected = self.reflected(vertex, &pick, &incoming);
             if reflected == Rgb::ZERO {
@@ -193,9 +192,9 @@ impl Integrator<'_> {
         }
     }
 
-    /// Samples a picked light as seen from a point. Infinite lights are sampled on the side of the normal
+    /// Samples a picked light as seen from what is lit. Infinite lights are sampled on the side of the normal
     /// only, or all around if it is zero.
-    pub fn incoming(&self, light: Picked, point: Vec3, normal: Vec3, u: Vec2) -> Option<Incoming> {
+    pub fn incoming(&self, light: Picked, at: Lit, normal: Vec3, u: Vec2) -> Option<Incoming> {
         let links = self.links.filter(|_| built_in::LINKS);
         let shadow_set = links.and_then(|links| links.shadow_set(light));
         // Light that passes what a reflected ray would hit is found by sampling alone.
@@ -203,16 +202,15 @@ impl Integrator<'_> {
         let emitter = match light {
             Picked::Emitter(emitter) => emitter,
             Picked::Beside(row) => {
-                let light = &self.infinite[row as usize];
-                let s = light.sample(normal, u)?;
+                let of_row = &self.infinite[row as usize];
+                let s = of_row.sample(normal, u)?;
                 let (direction, pdf) = (s.direction, s.pdf);
-                let passes =
-                    self.filtered(Picked::Beside(row), point, Source::Direction(direction));
+                let passes = self.filtered(light, at, Source::Direction(direction));
                 if passes == Rgb::ZERO {
                     return None;
                 }
                 let radiance = s.radiance * passes;
-                let is_seen = light.visibility.reflections && by_reflection;
+                let is_seen = of_row.visibility.reflections && by_reflection;
                 return Some(Incoming {
                     direction,
                     radiance,
@@ -223,8 +221,8 @@ impl Integrator<'_> {
                 });
             }
         };
-        let s = self.emitters.sample(emitter, point, u)?;
-        let passes = self.filtered(light, point, Source::Point(s.point));
+        let s = self.emitters.sample(emitter, at.point, u)?;
+        let passes = self.filtered(light, at, Source::Point(s.point));
         if passes == Rgb::ZERO {
             return None;
         }

@@ -17,6 +17,7 @@ use super::direct::another;
 use super::path::{Integrator, PathScratch, TraceStats};
 use super::picker::{PickScratch, Site, Wanted};
 use super::rays::{Anchor, Passed};
+use crate::emitter::Lit;
 use crate::light_tree::{Cell, Picked, ReceiverClass, Segment, Splitting};
 use crate::math::color::{Rgb, luminance};
 use crate::scene::{Camera, Medium, Pose, Scene};
@@ -188,13 +189,14 @@ impl Integrator<'_> {
         let (origin, length) = (stretch.origin.as_vec3(), stretch.length as f32);
         let segment = Segment { origin, direction, length };
         let site = Site::Along(segment, (lost / extinction) as f32);
-        let class = self.links.map_or(ReceiverClass::ALL, |links| links.of_fog());
+        let unlinked = (None, ReceiverClass::ALL);
+        let (membership, class) = self.links.map_or(unlinked, |links| links.of_fog());
         let wanted = Wanted { site, cell: Cell::NONE, class };
         let mut sum = Rgb::ZERO;
         let PathScratch { picks, stats, by_group, blocked, trial, .. } = scratch;
         let how = self.picker.splitting(bounce);
         let through = |t: f64| passed.tint((part.0 + t) as f32);
-        let part = (fog, &stretch, &through);
+        let part = (fog, membership, &stretch, &through);
         self.gather_along(
             part,
             (&wanted, how),
@@ -227,7 +229,7 @@ impl Integrator<'_> {
     /// it if nothing blocks it, and the share that arrives. `through` is what panes let through from a point of it.
     fn gather_along(
         &self,
-        (fog, stretch, through): (&Fog, &Stretch, &impl Fn(f64) -> Rgb),
+        (fog, membership, stretch, through): (&Fog, Option<u32>, &Stretch, &impl Fn(f64) -> Rgb),
         (wanted, how): (&Wanted, &Splitting),
         ([u_pick, u_place, lu, lv], salt): ([f32; 4], u32),
         accept: &impl Fn(u32, u32, Vec2) -> bool,
@@ -248,7 +250,8 @@ impl Integrator<'_> {
             let Some(Drawn { t, pdf }) = drawn else { return };
             let point = stretch.at(t).as_vec3();
             let u = another(Vec2::new(lu, lv), !salt, pick.light);
-            let Some(incoming) = self.incoming(pick.light, point, Vec3::ZERO, u) else { return };
+            let lit = Lit { point, membership };
+            let Some(incoming) = self.incoming(pick.light, lit, Vec3::ZERO, u) else { return };
             stats.rays += 1;
             stats.shadow_rays += 1;
             let arriving = self.arriving_within(None, &Anchor::free(point), &incoming, accept);

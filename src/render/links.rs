@@ -2,7 +2,8 @@
 //!
 //! A surface is lit by the lights whose light link holds it, however their light gets there: by sampling them, or by
 //! a reflected ray that hits one. The eye sees every light. Light that other surfaces reflect is theirs, so it is
-//! not linked. Fog is lit as the prim that it belongs to; fog without a prim is lit by all.
+//! not linked. Fog is lit as the prim that it belongs to; fog without a prim is lit by all. Light filters are linked in
+//! the same way to what they filter for ([`Lit`](crate::emitter::Lit)); who picks lights knows nothing of that.
 //!
 //! A shadow link is about rays to one light, and a reflected ray is not told for which light it is meant: it ends on
 //! a surface that does not cast shadows from the light behind. So light from a light that has a shadow link is found
@@ -97,16 +98,18 @@ pub struct FrameLinks<'a> {
 }
 
 impl FrameLinks<'_> {
-    /// The class of an instance's surface.
+    /// The membership of an instance's surface, and its class.
     #[inline]
-    pub fn of_instance(&self, instance: u32) -> ReceiverClass {
+    pub fn of_instance(&self, instance: u32) -> (Option<u32>, ReceiverClass) {
         let row = self.shot.memberships[instance as usize];
-        self.shot.class_of((row != EVERY).then_some(row))
+        let membership = (row != EVERY).then_some(row);
+        (membership, self.shot.class_of(membership))
     }
 
-    /// The class of the fog.
-    pub fn of_fog(&self) -> ReceiverClass {
-        self.shot.class_of(self.shot.linking.of_medium())
+    /// The membership of the fog, and its class.
+    pub fn of_fog(&self) -> (Option<u32>, ReceiverClass) {
+        let membership = self.shot.linking.of_medium();
+        (membership, self.shot.class_of(membership))
     }
 
     /// Whether a light lights a class.

@@ -18,7 +18,7 @@ use super::rays::{Hit, HitSurface, Passed, Seen, Sender, Tracer};
 use super::settings::RenderSettings;
 use super::surface::Surfaces;
 use super::vertex::{Inside, Vertex};
-use crate::emitter::{EmitterHit, InfiniteLight, PosedEmitters, PosedFilters, Source};
+use crate::emitter::{EmitterHit, InfiniteLight, Lit, PosedEmitters, PosedFilters, Source};
 use crate::light_tree::learned::Cells;
 use crate::light_tree::{Cell, Picked, Receiver, Splitting};
 use crate::math::built_in;
@@ -119,7 +119,7 @@ impl TraceStats {
 struct Origin {
     wanted: Wanted,
     how: Splitting,
-    point: Vec3,
+    lit: Lit,
     normal: Vec3,
     bsdf_pdf: f32,
     /// How much of what it reflects its diffuse lobe does, if anybody asks.
@@ -264,13 +264,13 @@ impl Integrator<'_> {
                 }
                 throughput /= survival;
             }
-            let Receiver { point, normal } = vertex.receiver;
+            let (lit, normal) = (vertex.lit(), vertex.receiver.normal);
             let how = *self.picker.splitting(bounce);
             let share = |_| vertex.reflection.diffuse_share(next.wi);
             let diffuse_share =
                 self.responses.filter(|_| built_in::MULTIPLIERS).map_or(Rgb::ZERO, share);
             let bsdf_pdf = next.pdf;
-            before = Some(Origin { wanted, how, point, normal, bsdf_pdf, diffuse_share });
+            before = Some(Origin { wanted, how, lit, normal, bsdf_pdf, diffuse_share });
             origin = vertex.anchor.origin_toward(next.wi);
             direction = next.wi;
             inside = if vertex.is_beyond(next.wi) { vertex.beyond } else { vertex.here };
@@ -379,11 +379,11 @@ impl Integrator<'_> {
             return Rgb::ZERO;
         }
         let weight = before.as_ref().map_or(1.0, |before| {
-            let pdf = || self.emitters.pdf(&at, before.point);
+            let pdf = || self.emitters.pdf(&at, before.lit.point);
             self.weight_of_hit(before, light, scratch, pdf)
         });
         let filtered = before.as_ref().map_or(Rgb::ONE, |before| {
-            self.filtered(light, before.point, Source::Point(at.point))
+            self.filtered(light, before.lit, Source::Point(at.point))
                 * self.reflected_share(light, before.diffuse_share)
         });
         let arriving = throughput * (radiance * filtered * weight);
@@ -415,7 +415,7 @@ impl Integrator<'_> {
                 self.weight_of_hit(before, picked, scratch, || light.pdf(before.normal, direction))
             });
             let filtered = before.as_ref().map_or(Rgb::ONE, |before| {
-                self.filtered(picked, before.point, Source::Direction(direction))
+                self.filtered(picked, before.lit, Source::Direction(direction))
                     * self.reflected_share(picked, before.diffuse_share)
             });
             let light = radiance * filtered * weight;

@@ -4,6 +4,7 @@ use super::bsdf::Reflection;
 use super::path::Integrator;
 use super::picker::{Site, Wanted};
 use super::rays::{Anchor, Hit, HitSurface};
+use crate::emitter::Lit;
 use crate::light_tree::{Cell, Glossy, Lobes, Receiver, ReceiverClass};
 use crate::math::built_in;
 use crate::math::color::Rgb;
@@ -28,6 +29,8 @@ pub struct Vertex {
     pub here: Inside,
     /// What is on the other.
     pub beyond: Inside,
+    /// The link sets that its surface is in; `None` is every set.
+    pub membership: Option<u32>,
     /// Which lights light it.
     pub class: ReceiverClass,
 }
@@ -49,12 +52,12 @@ impl Integrator<'_> {
             surface.frame.normal
         };
         let receiver = Receiver { point: hit.anchor.position, normal };
-        let class = self
-            .links
-            .filter(|_| built_in::LINKS)
-            .map_or(ReceiverClass::ALL, |links| links.of_instance(instance));
+        let links = self.links.filter(|_| built_in::LINKS);
+        let unlinked = (None, ReceiverClass::ALL);
+        let (membership, class) = links.map_or(unlinked, |links| links.of_instance(instance));
         let [here, beyond] = self.sides(hit, wo);
-        Some(Vertex { anchor: hit.anchor, reflection, wo, receiver, here, beyond, class })
+        let anchor = hit.anchor;
+        Some(Vertex { anchor, reflection, wo, receiver, here, beyond, membership, class })
     }
 
     /// What is on the side of `wo` of a surface, and what on the other. Only solid glass knows.
@@ -80,6 +83,11 @@ impl Integrator<'_> {
 }
 
 impl Vertex {
+    /// What light falls on.
+    pub fn lit(&self) -> Lit {
+        Lit { point: self.receiver.point, membership: self.membership }
+    }
+
     /// What lights are picked for here. The BSDF is part of it only if it has a specular lobe. With a
     /// sampler, a direction is sampled from the BSDF.
     pub fn wanted(&self, sampler: Option<&mut Sampler>) -> Wanted {

@@ -2,7 +2,9 @@
 //!
 //! A filter stands at a node, whose matrix takes its own space to the world's. It is asked about a point that is lit and about
 //! the place on the light from which it is lit. The eye sees lights as they are; what surfaces and fog get of them, and what
-//! reflected rays find of them, is filtered.
+//! reflected rays find of them, is filtered. A filter may be for some geometry alone ([`Linking::of_filter`]).
+//!
+//! [`Linking::of_filter`]: super::Linking::of_filter
 
 use crate::math::color::Rgb;
 use glam::Vec3;
@@ -29,6 +31,8 @@ pub enum FilterKind {
         /// The share that passes.
         through: Rgb,
     },
+    /// Filters all of the light alike.
+    Multiplier(Rgb),
     /// Filters by the distance from the light to the lit point, metres: dark below the first number of `near`, whole
     /// from its second one on; whole up to the first of `far`, dark from its second. In between it is a smoothstep.
     Decay {

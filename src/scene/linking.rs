@@ -1,9 +1,9 @@
-//! Linking: which geometry a light lights, and which casts shadows from it (UsdLux's `lightLink` and
-//! `shadowLink`).
+//! Linking: which geometry a light lights, which casts shadows from it, and for which a light filter filters (UsdLux's
+//! `lightLink`, `shadowLink` and `filterLink`).
 //!
 //! A *link set* is the geometry that a collection holds. Sets are numbered. A light that lights everything, or is
-//! shadowed by everything, has none; geometry that is in every set has no row either. So a scene without linking
-//! has empty tables.
+//! shadowed by everything, has none, nor has a filter that filters for everything; geometry that is in every set has no
+//! row either. So a scene without linking has empty tables.
 
 use std::collections::{BTreeMap, HashMap};
 
@@ -15,6 +15,7 @@ pub struct Linking {
     memberships: Vec<Membership>,
     instances: BTreeMap<u32, Links>,
     lights: BTreeMap<u32, Links>,
+    filters: BTreeMap<u32, u32>,
     medium: Option<u32>,
 }
 
@@ -65,17 +66,22 @@ pub struct LinkRows {
     pub instances: BTreeMap<u32, Links>,
     /// By row of [`Scene::lights`](super::Scene::lights); as geometry a light is the shape that casts shadows.
     pub lights: BTreeMap<u32, Links>,
+    /// The set that a filter filters for, by row of [`LightFilters::all`](super::LightFilters::all).
+    pub filters: BTreeMap<u32, u32>,
     /// The membership of the fog.
     pub medium: Option<u32>,
 }
 
 impl Linking {
-    /// Links in their normal form. Sets that no light names have no meaning.
+    /// Links in their normal form. Sets that no light and no filter names have no meaning.
     pub fn new(rows: LinkRows) -> Linking {
-        let all = || rows.instances.values().chain(rows.lights.values());
-        let named = all().flat_map(|links| [links.light, links.shadow]).flatten();
-        let Some(last) = named.max() else { return Linking::default() };
-        let new_number = Renumbering::of(last as usize + 1, &rows.memberships, all());
+        let named = || {
+            let prims = rows.instances.values().chain(rows.lights.values());
+            let of_lights = prims.flat_map(|links| [links.light, links.shadow]).flatten();
+            of_lights.chain(rows.filters.values().copied())
+        };
+        let Some(last) = named().max() else { return Linking::default() };
+        let new_number = Renumbering::of(last as usize + 1, &rows.memberships, named());
         let sets = new_number.sets;
         let mut memberships = Vec::new();
         let mut known = HashMap::new();
@@ -101,14 +107,16 @@ impl Linking {
             new.filter(|(_, links)| *links != Links::default()).collect()
         };
         let (instances, lights) = (settled(rows.instances), settled(rows.lights));
+        let filters = rows.filters.iter().filter_map(|(&at, &old)| Some((at, set(Some(old))?)));
+        let filters = filters.collect();
         let medium = row(rows.medium);
         match sets {
             0 => Linking::default(),
-            _ => Linking { sets, memberships, instances, lights, medium },
+            _ => Linking { sets, memberships, instances, lights, filters, medium },
         }
     }
 
-    /// Whether every light lights everything, and everything casts shadows from it.
+    /// Whether every light lights everything, everything casts shadows from it, and its filters filter for everything.
     pub fn is_empty(&self) -> bool {
         self.sets == 0
     }
@@ -133,6 +141,11 @@ impl Linking {
         self.lights.get(&row).copied().unwrap_or_default()
     }
 
+    /// The set that a row of [`LightFilters::all`](super::LightFilters::all) filters for. `None` is everything.
+    pub fn of_filter(&self, row: u32) -> Option<u32> {
+        self.filters.get(&row).copied()
+    }
+
     /// The membership of the fog.
     pub fn of_medium(&self) -> Option<u32> {
         self.medium
@@ -155,20 +168,26 @@ impl Linking {
     pub fn linked_lights(&self) -> impl Iterator<Item = (u32, Links)> + '_ {
         self.lights.iter().map(|(&row, &links)| (row, links))
     }
+
+    /// How many filters do not filter for everything.
+    pub fn linked_filters(&self) -> usize {
+        self.filters.len()
+    }
 }
 
 /// Which sets hold the same, and which hold everything.
 struct Renumbering {
-    /// For each old number the new one; `None` if the set holds everything, or no light names it.
+    /// For each old number the new one; `None` if the set holds everything, or nothing names it.
     new_of: Vec<Option<u32>>,
     sets: u32,
 }
 
 impl Renumbering {
-    fn of<'a>(
+    /// Of so many sets, in the order in which they are `named`.
+    fn of(
         count: usize,
         memberships: &[Membership],
-        links: impl Iterator<Item = &'a Links>,
+        named: impl Iterator<Item = u32>,
     ) -> Renumbering {
         // Each membership divides the sets into those that hold it and the others. Two sets that none of them
         // divides are one.
@@ -197,8 +216,7 @@ impl Renumbering {
         }
         let mut new_of = vec![None; count];
         let mut number_of_part = HashMap::new();
-        // In the order of what names them.
-        for set in links.flat_map(|links| [links.light, links.shadow]).flatten() {
+        for set in named {
             let at = set as usize;
             if lacks[at] || inside_of[at] < inside_rows {
                 let next = number_of_part.len() as u32;
@@ -257,10 +275,13 @@ mod tests {
                 shadow,
             });
             let table = || prop::collection::btree_map(0u32..20, links.clone(), 0..12);
-            (table(), table(), row.clone()).prop_map(move |(instances, lights, medium)| LinkRows {
+            let filters = prop::collection::btree_map(0u32..9, 0..SETS, 0..4);
+            let all = (table(), table(), filters, row.clone());
+            all.prop_map(move |(instances, lights, filters, medium)| LinkRows {
                 memberships: memberships.clone(),
                 instances,
                 lights,
+                filters,
                 medium,
             })
         })
@@ -286,6 +307,13 @@ mod tests {
                 }
                 let fog = told(of_light.light, rows.medium);
                 prop_assert_eq!(linking.holds(own.light, linking.of_medium()), fog);
+            }
+            for (&filter, &set) in &rows.filters {
+                for (&instance, of_instance) in &rows.instances {
+                    let row = linking.of_instance(instance).membership;
+                    let filtered = told(Some(set), of_instance.membership);
+                    prop_assert_eq!(linking.holds(linking.of_filter(filter), row), filtered);
+                }
             }
         }
 

@@ -42,6 +42,8 @@ pub struct Requirements {
     pub light_links: usize,
     /// Those from which not everything casts shadows.
     pub shadow_links: usize,
+    /// Light filters that do not filter for everything.
+    pub filter_links: usize,
     /// Meshes that more than one instance shares.
     pub shared_meshes: usize,
     /// Nodes that move.
@@ -106,6 +108,7 @@ impl Requirements {
             needs.light_links += usize::from(links.light.is_some());
             needs.shadow_links += usize::from(links.shadow.is_some());
         }
+        needs.filter_links = linking.linked_filters();
         needs.shared_meshes = uses.iter().filter(|&&count| count > 1).count();
         for light in &scene.lights {
             needs.varying_lights += usize::from(light.values.as_deref().is_some_and(Keys::varies));

@@ -1,8 +1,13 @@
 //! Links that changed.
 
 use crate::street::{POINT, SPHERE, SUN, diff, only, put, street, tree_of};
-use candelabra::diff::{DiffOptions, Difference, Relinked, Side, Verb, compare};
-use candelabra::scene::{LinkRows, Linking, Links, Membership, Scene};
+use candelabra::diff::{
+    DiffOptions, Difference, Relinked, RelinkedFilter, Side, Text, Verb, compare,
+};
+use candelabra::scene::{
+    FilterKind, LightFilter, LightFilters, LinkRows, Linking, Links, Membership, Scene,
+};
+use glam::Vec3;
 use tempfile::TempDir;
 
 /// Rows of the street's instances.
@@ -59,6 +64,42 @@ fn a_light_that_lights_others_is_told_with_them() {
         ];
         assert_eq!(only(&found).differences, links);
     }
+}
+
+/// The street, whose point has a filter that leaves out some instances.
+fn filtered(from: &[u32]) -> Scene {
+    let mut scene = street();
+    let node = put(&mut scene, "gel", [0.0, 2.0, 0.0]);
+    let kind = FilterKind::Multiplier(Vec3::splat(0.5));
+    let lights = [(POINT as u32, 0)].into();
+    let filters = vec![LightFilter { node, kind }];
+    scene.light_filters = LightFilters::new(filters, vec![[0].into()], lights, Default::default());
+    let outside = Links { membership: Some(0), ..Links::default() };
+    scene.linking = Linking::new(LinkRows {
+        memberships: vec![Membership::Outside([0].into())],
+        instances: from.iter().map(|&row| (row, outside)).collect(),
+        filters: [(0, 0)].into(),
+        ..LinkRows::default()
+    });
+    scene
+}
+
+#[test]
+fn a_filter_that_filters_for_others_is_told_with_them() {
+    let found = diff(filtered(&[WALL]), filtered(&[PANEL, BULB]));
+    let change = only(&found);
+    assert_eq!((change.verb, change.path()), (Verb::Dirtied, "/street/point"));
+    let prims = relinked(&["wall"], &["bulb_1", "panel"]);
+    let filters = vec![RelinkedFilter { path: "/street/gel".into(), prims }];
+    assert_eq!(change.differences, [Difference::FilterLink { filters }]);
+    let told = Text { of: &found, most: 9 }.to_string();
+    assert!(told.contains("/street/gel filters for 1 more (/street/wall) and 2 fewer"), "{told}");
+    assert!(diff(filtered(&[WALL]), filtered(&[WALL])).is_same());
+    // Without a link before, everything was filtered.
+    let found = diff(filtered(&[]), filtered(&[WALL]));
+    let filters =
+        vec![RelinkedFilter { path: "/street/gel".into(), prims: relinked(&[], &["wall"]) }];
+    assert_eq!(only(&found).differences, [Difference::FilterLink { filters }]);
 }
 
 #[test]

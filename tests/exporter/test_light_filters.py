@@ -100,7 +100,6 @@ def test_a_rod_turned_inside_out_and_one_that_brightens(export):
     ("int inputs:falloff = 2", "its falloff does not ascend"),
     ("float inputs:wonder = 1", "nobody knows its wonder"),
     ("float inputs:radius.connect = </F.inputs:x>", "its radius is connected"),
-    ("rel collection:filterLink:includes = </L>", "linked to some geometry alone"),
     ('token inputs:ri:combineMode = "max"', "combined with others"),
 ])  # fmt: skip
 def test_rods_whose_meaning_is_not_published_are_lost(export, body, why):

@@ -202,9 +202,6 @@ def test_filters_multiply_one_another_and_over_time(gltf):
     (MULTIPLIER, "float inputs:ri:intensity = 5\n float inputs:colorSaturation = 0", "its colorSaturation is 0"),
     (MULTIPLIER, "float inputs:ri:intensity = 5\n float inputs:ri:wonder = 0", "nobody knows its wonder"),
     (MULTIPLIER, "float inputs:ri:intensity.connect = </F0.inputs:x>", "its intensity is connected"),
-    (MULTIPLIER, "rel collection:filterLink:includes = </L>", "linked to some geometry alone"),
-    (MULTIPLIER, "rel collection:filterLink:excludes = </L>", "linked to some geometry alone"),
-    (MULTIPLIER, "uniform bool collection:filterLink:includeRoot = 0", "linked to some geometry alone"),
     ("PxrBarnLightFilter", "float inputs:width = 2", "PxrBarnLightFilter"),
     ("LightFilter", 'uniform token lightFilter:shaderId = "SomeFilter"', "SomeFilter"),
 ])  # fmt: skip

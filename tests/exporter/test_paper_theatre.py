@@ -59,10 +59,10 @@ def test_it_is_made_again_byte_by_byte_and_small(tmp_path):
     assert sum(map(len, committed.values())) < 1_000_000
 
 
-def test_nothing_is_lost_and_two_things_are_noted(exported):
+def test_nothing_is_lost_and_three_things_are_noted(exported):
     assert exported.code == 0
     assert exported.report["warnings"] == []
-    assert exported.noted() == {"inputs:visibleInPrimaryRay = True", "candelabra:lightGroup"}
+    assert exported.noted() == {"inputs:visibleInPrimaryRay = True", "candelabra:lightGroup", "light filter"}
 
 
 def test_lamps_by_the_hundred(theatre):
@@ -97,6 +97,21 @@ def test_links_say_what_the_stage_says(theatre):
     }
     assert {key: tuple(lit(*key, path) for path in prims) for key in table} == table
     assert "lightLink" not in theatre.lux(f"{LIGHTS}/PaperMoon")
+
+
+def test_the_flag_dims_the_house_and_not_the_dragon(theatre):
+    assert theatre.lux(f"{LIGHTS}/Key")["filters"] == [f"{LIGHTS}/Flag"]
+    flag = theatre.node(f"{LIGHTS}/Flag")["extras"]["usdLightFilter"]
+    assert (flag["type"], flag["inside"]) == ("rod", pytest.approx([0.4] * 3)) and flag["edge"] == 60
+
+    def is_dimmed(path: str) -> bool:
+        links = theatre.node(path)["extras"].get("usdLinks", {"outside": []})
+        number = flag["filterLink"]
+        return number in links["inside"] if "inside" in links else number not in links["outside"]
+
+    assert is_dimmed(f"{THEATRE}/Floor") and not is_dimmed("/World/Dragon/Puppet/Skin/Skull")
+    assert not is_dimmed("/World/Garden/Audience/Bench00/Bench")
+    assert theatre.lux(f"{LIGHTS}/Fill")["specular"] == pytest.approx(0.2)
 
 
 def test_profiles_are_beside_the_file_and_their_candela_count(exported, theatre):

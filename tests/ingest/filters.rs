@@ -58,6 +58,41 @@ fn filters_are_read_and_found_by_path() {
     assert_eq!(scene.nodes[found.all()[1].node as usize].path.as_ref(), "/F1");
 }
 
+/// For what each filter filters: the lamp's own mesh, and a card.
+#[test]
+fn filters_are_for_the_geometry_of_their_sets() {
+    let filters = [
+        json!({"type": "rod", "filterLink": 1}),
+        json!({"type": "multiplier", "share": [0.5, 1, 2], "filterLink": 0}),
+        json!({"type": "multiplier"}),
+        json!({"type": "rod", "filterLink": 7}),
+    ];
+    let mut file = with_filters(&["/F0", "/F1"], &filters);
+    let card = json!({"mesh": 0, "extras": {"usdLinks": {"outside": [0]}}});
+    file.add("nodes", card);
+    file.json["nodes"][0]["extras"]["usdLinks"] = json!({"outside": [1]});
+    file.json["scenes"][0]["nodes"] = (0..=filters.len() + 1).collect();
+    let scene = load(&file);
+    assert_eq!(scene.notes, []);
+    let linking = &scene.linking;
+    let holds = |filter: u32, row: u32| {
+        linking.holds(linking.of_filter(filter), linking.of_instance(row).membership)
+    };
+    let told: Vec<_> = (0..4).map(|filter| [holds(filter, 0), holds(filter, 1)]).collect();
+    // Set 7 holds everything.
+    assert_eq!(told, [[false, true], [true, false], [true, true], [true, true]]);
+    assert_eq!((linking.sets(), scene.requirements().filter_links), (2, 2));
+    let kinds = scene.light_filters.all().iter().map(|filter| &filter.kind);
+    let shares: Vec<_> = kinds.filter(|kind| matches!(kind, FilterKind::Multiplier(_))).collect();
+    let (own, plain) = (Vec3::new(0.5, 1.0, 2.0), Vec3::ONE);
+    assert_eq!(shares, [&FilterKind::Multiplier(own), &FilterKind::Multiplier(plain)]);
+    // A filter that no light names links nothing that anybody sees, and is no reason for a note.
+    let mut file = with_filters(&[], &[json!({"type": "rod", "filterLink": 3})]);
+    file.json["nodes"][0]["extras"]["usdLinks"] = json!({"outside": [3, 4]});
+    let notes = load(&file).notes;
+    assert!(notes.len() == 1 && notes[0].text.contains("no filter names"), "{notes:?}");
+}
+
 #[test]
 fn filters_that_are_not_there_or_unknown_are_noted() {
     let scene = load(&with_filters(&["/Gone", "/F0"], &[json!({"type": "gobo"})]));
@@ -86,6 +121,14 @@ fn filters_that_make_no_sense_are_refused() {
         (json!({"type": "blocker", "shape": "box", "through": [-1, 0, 0]}), "a share is negative"),
         (json!({"type": "decay", "near": [2, 1]}), "ends before it starts"),
         (json!({"type": "decay", "far": [2, 1]}), "ends before it starts"),
+        (json!({"type": "multiplier", "share": [0, 0, -1]}), "a share is negative"),
+        (
+            json!({"type": "rod", "filterLink": 16384}),
+            "filterLink is 16384, and sets are 0 to 16383",
+        ),
+        (json!({"type": "rod", "filterLink": -1}), "invalid value"),
+        (json!({"type": "rod", "filterLink": 0.5}), "invalid type"),
+        (json!({"type": "rod", "filterLink": [0]}), "invalid type"),
         (json!({"type": "decay", "far": "far"}), "usdLightFilter"),
         (json!({}), "usdLightFilter"),
     ] {

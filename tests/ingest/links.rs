@@ -38,7 +38,7 @@ fn a_file_without_links_has_none() {
     let scene = load(&with_cards(json!({"type": "SphereLight"}), &[json!({"outside": [0]})]));
     assert!(scene.linking.is_empty());
     assert!(
-        scene.notes.iter().any(|note| note.text.contains("no light names")),
+        scene.notes.iter().any(|note| note.text.contains("no light and no filter names")),
         "{:?}",
         scene.notes
     );

@@ -14,7 +14,7 @@ use glam::{DVec3, Vec3};
 use std::f64::consts::PI;
 
 /// A ball, soft across a shell.
-fn ball(radius: f32, edge: f32, inside: f32, outside: f32) -> FilterKind {
+pub fn ball(radius: f32, edge: f32, inside: f32, outside: f32) -> FilterKind {
     FilterKind::Rod(Rod {
         min: Vec3::ZERO,
         max: Vec3::ZERO,

@@ -398,7 +398,7 @@ fn equal_sets_share_one_mask() {
     assert_eq!(links.lit_by().classes(), 3);
     let frame = FrameLinks { shot: &links, infinite: &[] };
     for instance in 0..300 {
-        let class = frame.of_instance(instance);
+        let (_, class) = frame.of_instance(instance);
         assert_eq!(class == ReceiverClass::ALL, instance < 3);
         for emitter in 0..300 {
             let LightSource::Light(row) = set.emitters.light_of(emitter).source else { panic!() };

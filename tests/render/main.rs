@@ -1,6 +1,7 @@
 //! Proof that pictures are right: closed forms, other renderers, and every strategy against every
 //! other.
 
+mod animated_lights;
 mod bounces;
 mod cameras;
 mod closed_forms;
@@ -9,6 +10,10 @@ mod deforming;
 mod determinism;
 mod extremes;
 mod far;
+#[path = "../ingest/files.rs"]
+#[allow(dead_code)]
+mod files;
+mod filter_links;
 mod filters;
 mod fitted;
 mod flames;
@@ -40,4 +45,5 @@ mod shutter;
 mod stage;
 mod statistics;
 mod strategies;
+mod together;
 mod visibility;

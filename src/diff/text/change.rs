@@ -1,6 +1,6 @@
 //! One change as a sentence.
 
-use crate::diff::{Change, Difference, Kind, LightCard, Relinked, Verb};
+use crate::diff::{Change, Difference, Kind, LightCard, Relinked, RelinkedFilter, Verb};
 use crate::page::{Short, Triple, counted};
 
 /// What is said of a change after its path.
@@ -91,6 +91,12 @@ fn amount(difference: &Difference, infinite: bool) -> String {
         Difference::LightLink { ref prims } => format!("lights {}", relinked(prims.as_ref())),
         Difference::ShadowLink { ref prims } => {
             format!("is shadowed by {}", relinked(prims.as_ref()))
+        }
+        Difference::FilterLink { ref filters } => {
+            let one = |filter: &RelinkedFilter| {
+                format!("{} filters for {}", filter.path, relinked(Some(&filter.prims)))
+            };
+            filters.iter().map(one).collect::<Vec<_>>().join(", ")
         }
         Difference::OverTime { apart: Some(apart), .. } => {
             let parts = [

@@ -2,6 +2,7 @@
 
 use super::Output;
 use super::document::{UsdLightFilter, UsdLux, reals};
+use super::links::LinkTable;
 use crate::ingest::error::Fault;
 use crate::math::color::Rgb;
 use crate::scene::{BlockerShape, Category, FilterKind, LightFilter, LightFilters, Rod};
@@ -29,10 +30,11 @@ pub(super) struct FilterTable {
 }
 
 impl FilterTable {
-    /// Adds the filter at a node, if there is one.
+    /// Adds the filter at a node, if there is one, and its link.
     pub(super) fn add(
         &mut self,
         output: &mut Output,
+        links: &mut LinkTable,
         extras: &Extras,
         node: u32,
         object: &str,
@@ -47,7 +49,9 @@ impl FilterTable {
         let knots = filter.ramp.as_ref().map_or(0, Vec::len) * size_of::<[f32; 2]>();
         let bytes = size_of::<LightFilter>() + knots + 2 * path.len();
         output.budget.take(bytes as u64, || object.to_string())?;
-        self.known.insert(path, self.filters.len() as u32);
+        let row = self.filters.len() as u32;
+        links.add_filter(output, filter.filter_link, row, object)?;
+        self.known.insert(path, row);
         self.filters.push(LightFilter { node, kind });
         Ok(())
     }
@@ -137,12 +141,13 @@ fn kind(filter: &UsdLightFilter, object: &str) -> Result<Option<FilterKind>, Fau
     let fault =
         |problem: &str| Err(Fault::new(object, format!("extras.usdLightFilter: {problem}")));
     let share = |rgb: Option<[_; 3]>, usual: Rgb| rgb.map_or(usual, |rgb| reals(rgb).into());
-    let [inside, outside, through] = [
+    let [inside, outside, through, whole] = [
         share(filter.inside, Rgb::ZERO),
         share(filter.outside, Rgb::ONE),
         share(filter.through, Rgb::ZERO),
+        share(filter.share, Rgb::ONE),
     ];
-    if [inside, outside, through].iter().any(|share| share.min_element() < 0.0) {
+    if [inside, outside, through, whole].iter().any(|share| share.min_element() < 0.0) {
         return fault("a share is negative");
     }
     Ok(Some(match filter.kind.as_str() {
@@ -178,6 +183,7 @@ fn kind(filter: &UsdLightFilter, object: &str) -> Result<Option<FilterKind>, Fau
             };
             FilterKind::Blocker { shape, through }
         }
+        "multiplier" => FilterKind::Multiplier(whole),
         "decay" => {
             let [near_m, far_m] = [filter.near, filter.far].map(|range| range.map(reals));
             if [near_m, far_m].iter().flatten().any(|[start, end]| start > end) {

@@ -196,7 +196,7 @@ impl Walk<'_> {
         if !had_fog && output.scene.medium.is_some() {
             self.links.set_medium(membership);
         }
-        self.filters.add(output, &row.extras, node, object)?;
+        self.filters.add(output, &mut self.links, &row.extras, node, object)?;
         let lux = UsdLux::of(&row.extras, object)?;
         let filters = self.filters.of_light(output, lux.as_ref(), object)?;
         let response = responses::of_light(lux.as_ref(), object)?;

@@ -1,4 +1,5 @@
-//! Linking: `extras.usdLinks` of geometry, `lightLink` and `shadowLink` in `extras.usdLux` of lights.
+//! Linking: `extras.usdLinks` of geometry, `lightLink` and `shadowLink` in `extras.usdLux` of lights, `filterLink` in
+//! `extras.usdLightFilter` of their filters.
 
 use super::Output;
 use super::document::{UsdLinks, UsdLux};
@@ -24,7 +25,7 @@ pub(super) struct LinkTable {
     of_primitives: HashMap<[usize; 2], Option<u32>>,
     /// The objects that say in which sets they are, and the largest number of those.
     told: Vec<(u32, String)>,
-    /// One past the largest set that a light names.
+    /// One past the largest set that a light or a filter names.
     sets: u32,
 }
 
@@ -85,21 +86,35 @@ impl LinkTable {
     /// The sets that the light at a node lights and is shadowed by.
     pub(super) fn of_light(&mut self, lux: Option<&UsdLux>, object: &str) -> Result<Links, Fault> {
         let Some(lux) = lux else { return Ok(Links::default()) };
-        let mut set = |told: Option<u64>, key: &str| match told {
-            Some(set) if set >= u64::from(MOST_SETS) => {
-                let problem =
-                    format!("extras.usdLux: {key} is {set}, and sets are 0 to {}", MOST_SETS - 1);
-                Err(Fault::new(object, problem).remedy(REMEDY))
-            }
-            Some(set) => {
-                self.sets = self.sets.max(set as u32 + 1);
-                Ok(Some(set as u32))
-            }
-            None => Ok(None),
-        };
-        let light = set(lux.light_link, "lightLink")?;
-        let shadow = set(lux.shadow_link, "shadowLink")?;
+        let light = self.named(lux.light_link, "usdLux: lightLink", object)?;
+        let shadow = self.named(lux.shadow_link, "usdLux: shadowLink", object)?;
         Ok(Links { membership: None, light, shadow })
+    }
+
+    /// A set that an object names.
+    fn named(&mut self, told: Option<u64>, key: &str, object: &str) -> Result<Option<u32>, Fault> {
+        let Some(set) = told else { return Ok(None) };
+        if set >= u64::from(MOST_SETS) {
+            let problem = format!("extras.{key} is {set}, and sets are 0 to {}", MOST_SETS - 1);
+            return Err(Fault::new(object, problem).remedy(REMEDY));
+        }
+        self.sets = self.sets.max(set as u32 + 1);
+        Ok(Some(set as u32))
+    }
+
+    /// Notes the set that a filter, by its row, filters for, if it names one.
+    pub(super) fn add_filter(
+        &mut self,
+        output: &mut Output,
+        told: Option<u64>,
+        row: u32,
+        object: &str,
+    ) -> Result<(), Fault> {
+        if let Some(set) = self.named(told, "usdLightFilter: filterLink", object)? {
+            take_row(output)?;
+            self.rows.filters.insert(row, set);
+        }
+        Ok(())
     }
 
     /// Notes the links of the instance that is added next.
@@ -132,14 +147,13 @@ impl LinkTable {
         let (sets, memberships) = (u64::from(self.sets), self.rows.memberships.len() as u64);
         for (last, object) in self.told {
             if last >= self.sets {
-                let text =
-                    "extras.usdLinks names link sets that no light names; they have no meaning";
+                let text = "extras.usdLinks names link sets that no light and no filter names; they have no meaning";
                 output.notes.add(Category::Lights, object, text);
             }
         }
         if sets * memberships > MOST_PAIRS {
             let problem = format!(
-                "{sets} link sets of lights and {memberships} memberships of geometry are too many"
+                "{sets} link sets of lights and filters, and {memberships} memberships of geometry are too many"
             );
             return Err(Fault::new("extras.usdLinks", problem).remedy(REMEDY));
         }

@@ -146,6 +146,9 @@ pub(in crate::ingest::gltf) struct UsdLightFilter {
     pub through: Option<[Real; 3]>,
     pub near: Option<[Real; 2]>,
     pub far: Option<[Real; 2]>,
+    pub share: Option<[Real; 3]>,
+    #[serde(rename = "filterLink")]
+    pub filter_link: Option<u64>,
 }
 
 /// `extras.usdLinks`: the link sets that geometry is in, or those that it is not in.
