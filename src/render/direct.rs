@@ -9,7 +9,7 @@ use crate::light_tree::{Picked, Splitting};
 use crate::math::built_in;
 use crate::math::color::{Rgb, luminance};
 use crate::math::random::hash;
-use crate::scene::Response;
+use crate::scene::{LightResponses, Response};
 use glam::{Vec2, Vec3};
 
 /// Light that may arrive at a point, if nothing is in its way.
@@ -76,10 +76,16 @@ impl Integrator<'_> {
         }
     }
 
+    /// The multipliers of all lights, if any has some.
+    #[inline]
+    pub(super) fn multipliers(&self) -> Option<&LightResponses> {
+        self.responses.filter(|_| built_in::MULTIPLIERS)
+    }
+
     /// The multipliers of a light, unless no light has any.
     #[inline]
     fn response(&self, light: Picked) -> Option<Response> {
-        let responses = self.responses.filter(|_| built_in::MULTIPLIERS)?;
+        let responses = self.multipliers()?;
         Some(match self.owner(light) {
             Owner::Instance(row) => responses.of_instance(row),
             Owner::Light(row) => responses.of_light(row),

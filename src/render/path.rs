@@ -266,9 +266,8 @@ impl Integrator<'_> {
             }
             let (lit, normal) = (vertex.lit(), vertex.receiver.normal);
             let how = *self.picker.splitting(bounce);
-            let share = |_| vertex.reflection.diffuse_share(next.wi);
-            let diffuse_share =
-                self.responses.filter(|_| built_in::MULTIPLIERS).map_or(Rgb::ZERO, share);
+            let share = |_: &LightResponses| vertex.reflection.diffuse_share(next.wi);
+            let diffuse_share = self.multipliers().map_or(Rgb::ZERO, share);
             let bsdf_pdf = next.pdf;
             before = Some(Origin { wanted, how, lit, normal, bsdf_pdf, diffuse_share });
             origin = vertex.anchor.origin_toward(next.wi);
@@ -428,8 +427,8 @@ impl Integrator<'_> {
     /// Whether a ray finds a light that it meets: the eye's always, a reflected one if the light lights what the ray
     /// left, and its shadows are those of everything.
     fn is_found(&self, before: &Option<Origin>, light: Picked) -> bool {
-        let links = self.links.as_ref().filter(|_| built_in::LINKS);
-        let Some((links, before)) = links.zip(before.as_ref()) else { return true };
+        let links = self.links.as_ref().zip(before.as_ref());
+        let Some((links, before)) = links.filter(|_| built_in::LINKS) else { return true };
         links.reflections_find(before.wanted.class, light)
     }
 
