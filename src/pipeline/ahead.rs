@@ -11,6 +11,7 @@ use crate::render::beauty::Beauty;
 use crate::render::knob::{Knobs, pilot_pays};
 use crate::render::png::exposure_for;
 use crate::render::{Progress, RenderDelegate, RenderError, RenderSettings, Split};
+use std::time::Instant;
 
 /// Rows of the small pictures.
 const HEIGHT: u32 = 27;
@@ -23,6 +24,8 @@ pub struct Glimpse {
     pub exposure: f32,
     /// Of its pixels.
     pub luminances: Vec<f64>,
+    /// Samples a second that were taken for it, by the clock.
+    pub rate: f64,
 }
 
 /// Renders a small picture of a frame. The delegate must have `settings`, and has them afterwards.
@@ -47,11 +50,15 @@ pub fn glimpse(
         crop: None,
         ..settings.clone()
     });
+    let began = Instant::now();
     let rendered = delegate.render(tree, frame, progress);
+    let seconds = began.elapsed().as_secs_f64();
     delegate.set_settings(settings.clone());
     let picture = Beauty::of(&rendered?.buffers, true);
-    let luminances = picture.pixels.iter().map(|&color| f64::from(luminance(color))).collect();
-    Ok(Glimpse { exposure: exposure_for(&picture), luminances })
+    let luminances: Vec<f64> =
+        picture.pixels.iter().map(|&color| f64::from(luminance(color))).collect();
+    let rate = (luminances.len() * SAMPLES as usize) as f64 / seconds.max(1e-9);
+    Ok(Glimpse { exposure: exposure_for(&picture), luminances, rate })
 }
 
 /// The frames of a scene that the grey floor is chosen from: the first, the middle and the last.
@@ -65,19 +72,20 @@ pub fn frames_of_grey(frames: &[i32]) -> Vec<i32> {
 }
 
 /// The settings with the knobs of splitting that are best for the shot. `pilot` asks the delegate, and is
-/// called only if there is anything to find out. Where `time_decides` how many samples there will be,
-/// those of the settings are only the most, and the usual number is taken for them.
+/// called only if there is anything to find out. Where time decides how many samples there will be, those of the settings are
+/// only the most: `in_time` has how many of a pixel the time is likely to pay for. A pilot is for that many, or the usual
+/// number if that is less, so that it takes no more than its share of the time.
 ///
 /// # Errors
 /// Those of `pilot`.
 pub fn with_knobs<E>(
     delegate: &mut RenderDelegate,
     settings: &RenderSettings,
-    time_decides: bool,
+    in_time: Option<u32>,
     pilot: impl FnOnce(&RenderDelegate) -> Result<Knobs, E>,
 ) -> Result<RenderSettings, E> {
     let usual = RenderSettings::default().samples;
-    let samples = if time_decides { settings.samples.min(usual) } else { settings.samples };
+    let samples = in_time.map_or(settings.samples, |paid| settings.samples.min(usual).min(paid));
     let asked = RenderSettings { samples, ..settings.clone() };
     let knobs = match pilot_pays(&asked) {
         true => {

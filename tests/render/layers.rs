@@ -217,9 +217,10 @@ fn any_tiling_by_crops_is_the_whole_picture() {
             let crop = Window { x0: x[0], y0: y[0], x1: x[1], y1: y[1] };
             let part = set.render(&RenderSettings { crop: Some(crop), ..settings.clone() }, FRAME);
             assert_eq!((part.window(), part.size()), (crop, [23, 17]));
-            // The variance is pooled with what is around a pixel.
+            // These two are pooled with what is around a pixel.
+            let is_pooled = |name: &String| name.starts_with("variance") || name == "error";
             let names = whole.layers().iter().flat_map(|layer| layer.channel_names());
-            let exact = (0..channels).zip(names).filter(|(_, name)| !name.starts_with("variance"));
+            let exact = (0..channels).zip(names).filter(|(_, name)| !is_pooled(name));
             for (channel, y) in exact.flat_map(|(c, _)| (crop.y0..crop.y1).map(move |y| (c, y))) {
                 let own = part.row(channel, (y - crop.y0) as usize);
                 let of_whole = &whole.row(channel, y as usize)[crop.x0 as usize..crop.x1 as usize];

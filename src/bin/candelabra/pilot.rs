@@ -68,7 +68,7 @@ pub fn run(arguments: &Arguments, display: &Display) -> Result<ShotCost> {
         }
     };
     let goal = ErrorGoal { error: arguments.error, grey, most: Effort::MOST };
-    let base = pipeline::with_knobs(&mut delegate, &base, false, |delegate| {
+    let base = pipeline::with_knobs(&mut delegate, &base, None, |delegate| {
         let aim = Aim::Error(goal);
         anyhow::Ok(knob::pilot(delegate, &trees.for_frame(own[0])?, own[0], aim)?)
     })?;

@@ -116,8 +116,13 @@ impl Deadline {
         (left > LEFT * self.seconds).then_some(SHARE * left * self.rate)
     }
 
+    /// How many samples fit into what is left at a rate, samples a second.
+    pub fn samples_at(&self, rate: f64) -> f64 {
+        rate * self.left().max(0.0)
+    }
+
     /// How many samples there will be in the end, if that is known.
     pub fn expected(&self, taken: u64) -> Option<u64> {
-        self.knows_rate().then(|| taken + (self.rate * self.left().max(0.0)) as u64)
+        self.knows_rate().then(|| taken + self.samples_at(self.rate) as u64)
     }
 }

@@ -10,7 +10,7 @@ use super::plan::{Plan, read_plan};
 use super::progress::{Cut, FrameProgress, Patience};
 use super::report::FrameCounts;
 use super::shot::Shot;
-use super::writer::{Finished, Writer, write_preview};
+use super::writer::{Finished, Writer, likely_seconds, write_preview};
 use super::{RenderError, RenderJob};
 use crate::emitter::Emitters;
 use crate::light_tree::LightTree;
@@ -26,9 +26,6 @@ use crate::render::passes::ErrorGoal;
 use crate::render::{self, RenderDelegate, RenderSettings, Split};
 use std::collections::BTreeMap;
 use std::time::Duration;
-
-/// Seconds to develop a pixel and write it, and as many for that of a preview: two cores, the usual layers.
-const SECONDS_A_PIXEL: f64 = 1e-6;
 
 /// One pass over the frames of a shot.
 pub(super) struct Pass<'a> {
@@ -170,10 +167,10 @@ impl<'a> Pass<'a> {
         self.outputs.check_frame(frame)?;
         let exposure = self.exposure()?;
         let grey = self.grey()?;
-        let settings = self.settings(plan.as_ref())?;
+        let deadline = self.deadline(writer);
+        let settings = self.settings(plan.as_ref(), deadline.as_ref())?;
         let stamp = self.stamp(frame, plan.as_ref())?;
         self.tell_caveat(frame)?;
-        let deadline = self.deadline(writer);
         let until = deadline.as_ref().map(Deadline::latest);
         let tolerance = deadline.as_ref().map_or(0.0, Deadline::tolerance);
         let Pass { job, delegate, shot, emitters, trees, learned, progress, watch, clock, .. } =
@@ -252,16 +249,10 @@ impl<'a> Pass<'a> {
     fn deadline(&self, writer: &Writer) -> Option<Deadline> {
         let each = self.job.effort.seconds?;
         let all = Duration::try_from_secs_f64(each * f64::from(self.rendered + 1)).ok()?;
-        let reserve = writer.seconds_of_a_frame().unwrap_or_else(|| self.seconds_to_write());
+        let has_preview = self.job.preview.is_some();
+        let likely = || likely_seconds(&self.shot.settings, has_preview);
+        let reserve = writer.seconds_of_a_frame().unwrap_or_else(likely);
         Some(Deadline::new(self.clock.started() + all, each, reserve))
-    }
-
-    /// How long writing a frame is likely to take, before one has been written.
-    fn seconds_to_write(&self) -> f64 {
-        let settings = &self.shot.settings;
-        let pixels = f64::from(settings.width) * f64::from(settings.height);
-        let preview = if self.job.preview.is_some() { SECONDS_A_PIXEL } else { 0.0 };
-        pixels * (SECONDS_A_PIXEL + preview)
     }
 
     /// Stops of previews, if there are any.
@@ -290,7 +281,11 @@ impl<'a> Pass<'a> {
 
     /// The settings, with the knobs of splitting that are best for the shot: by a pilot in the scene's first
     /// frame, whatever frames are asked for. A plan may have knobs of its own.
-    fn settings(&mut self, plan: Option<&Plan>) -> Result<RenderSettings, Trouble> {
+    fn settings(
+        &mut self,
+        plan: Option<&Plan>,
+        deadline: Option<&Deadline>,
+    ) -> Result<RenderSettings, Trouble> {
         let asked = &self.shot.settings;
         if let (Split::Auto, Some(knobs)) = (asked.split, plan.and_then(|plan| plan.knobs)) {
             return Ok(RenderSettings { split: Split::ByBounce(knobs), ..asked.clone() });
@@ -299,16 +294,31 @@ impl<'a> Pass<'a> {
             return Ok(settings.clone());
         }
         let aim = self.aim()?;
-        let Pass { job, delegate, shot, emitters, trees, learned, watch, clock, .. } = self;
+        let frame = frames_of(&self.shot.scene)[0];
+        let in_time = self.samples_in_time(deadline, frame)?;
+        let Pass { delegate, shot, emitters, trees, learned, watch, clock, .. } = self;
         let delegate = prepared(delegate, shot, (emitters, *learned), *watch, clock);
-        let frame = frames_of(&shot.scene)[0];
-        let found = with_knobs(delegate, &shot.settings, job.effort.time_decides(), |delegate| {
+        let found = with_knobs(delegate, &shot.settings, in_time, |delegate| {
             of_any_frame(shot, emitters, trees, frame, |tree| {
                 Ok(pilot(delegate, tree, frame, aim)?)
             })
         })?;
         clock.lap(|seconds| &mut seconds.ahead);
         Ok(self.settings.insert(found).clone())
+    }
+
+    /// How many samples of a pixel the rest of its time is likely to pay for, if nothing but time tells how many there
+    /// will be: by how long those of a small picture took.
+    fn samples_in_time(
+        &mut self,
+        deadline: Option<&Deadline>,
+        frame: i32,
+    ) -> Result<Option<u32>, Trouble> {
+        let decides = self.job.effort.time_decides();
+        let Some(deadline) = deadline.filter(|_| decides) else { return Ok(None) };
+        let rate = self.glimpse(frame)?.rate;
+        let [width, height] = [self.shot.settings.width, self.shot.settings.height].map(f64::from);
+        Ok(Some((deadline.samples_at(rate) / (width * height)) as u32))
     }
 
     /// What decides how many samples a pixel gets.

@@ -4,11 +4,11 @@ use super::RenderJob;
 use super::outputs::Outputs;
 use super::report::FrameCounts;
 use crate::pipeline::{Event, PreviewStamp, Stamp, Watch};
-use crate::render::RenderedFrame;
 use crate::render::beauty::Beauty;
 use crate::render::exr::write_exr;
 use crate::render::path::TraceStats;
 use crate::render::png::write_png;
+use crate::render::{RenderSettings, RenderedFrame};
 use crate::store::is_full;
 use std::fs;
 use std::io;
@@ -37,6 +37,15 @@ pub(super) struct Writing<'a> {
     pub watch: &'a dyn Watch,
     /// How long writing a frame took last, nanoseconds.
     pub nanoseconds: &'a AtomicU64,
+}
+
+/// Seconds to develop a pixel and write it, and as many for that of a preview: two cores, the usual layers.
+const SECONDS_A_PIXEL: f64 = 1e-6;
+
+/// How long writing a frame is likely to take, seconds, before one has been written.
+pub(super) fn likely_seconds(settings: &RenderSettings, has_preview: bool) -> f64 {
+    let pixels = f64::from(settings.width) * f64::from(settings.height);
+    pixels * SECONDS_A_PIXEL * if has_preview { 2.0 } else { 1.0 }
 }
 
 /// What a writer did.
