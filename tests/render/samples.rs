@@ -31,8 +31,11 @@ fn samples_that_are_not_finite_are_left_out_counted_and_located() {
     let first = left_out.iter().position(|&count| count > 0).unwrap() as u32;
     assert_eq!(first_non_finite, Some((first % 16, first / 16)));
     let file = File::of(&frame.buffers);
-    let is_depth = |name: &str| name == "Z";
-    assert!(file.channels.iter().all(|(n, v)| is_depth(n) || v.iter().all(|v| v.is_finite())));
+    let may_be_infinite = |name: &str| ["Z", "error"].contains(&name);
+    let is_finite = |values: &Vec<f32>| values.iter().all(|value| value.is_finite());
+    assert!(file.channels.iter().all(|(name, v)| may_be_infinite(name) || is_finite(v)));
+    let mut errors = left_out.iter().zip(file.channel("error"));
+    assert!(errors.all(|(&left_out, error)| left_out == 0 || error.is_infinite()));
     assert!(file.channel("G").contains(&5.0), "what is finite stays");
     let alone = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
     assert!(alone.install(|| delegate.render(&set.tree, 1, &()).unwrap()) == frame);
