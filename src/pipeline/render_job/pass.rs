@@ -308,7 +308,8 @@ impl<'a> Pass<'a> {
     }
 
     /// How many samples of a pixel the rest of its time is likely to pay for, if nothing but time tells how many there
-    /// will be: by how long those of a small picture took.
+    /// will be: by how long those of a small picture took. With checkpoints the clock is not asked: a frame that is gone
+    /// on with must find the knobs that it began with.
     fn samples_in_time(
         &mut self,
         deadline: Option<&Deadline>,
@@ -316,6 +317,9 @@ impl<'a> Pass<'a> {
     ) -> Result<Option<u32>, Trouble> {
         let decides = self.job.effort.time_decides();
         let Some(deadline) = deadline.filter(|_| decides) else { return Ok(None) };
+        if self.job.checkpoint {
+            return Ok(Some(u32::MAX));
+        }
         let rate = self.glimpse(frame)?.rate;
         let [width, height] = [self.shot.settings.width, self.shot.settings.height].map(f64::from);
         Ok(Some((deadline.samples_at(rate) / (width * height)) as u32))
