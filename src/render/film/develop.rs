@@ -75,7 +75,7 @@ impl Film {
         let told = |(pixel, halves): (usize, &Halves)| match halves.counts {
             [0, _] | [_, 0] => f64::INFINITY,
             _ if estimate.is_spoilt(pixel) => f64::INFINITY,
-            _ => estimate.error(pixel),
+            _ => estimate.told(pixel),
         };
         halves.iter().enumerate().map(told).collect()
     }

@@ -157,7 +157,12 @@ impl Estimate {
         self.own[pixel]
     }
 
-    /// The pooled error of a pixel.
+    /// The error that the neighbours of a pixel tell, without what blocked light may still add.
+    pub fn told(&self, pixel: usize) -> f64 {
+        (self.pooled[pixel] / self.samples[pixel].max(1.0)).sqrt()
+    }
+
+    /// The pooled error of a pixel, with what blocked light may still add.
     pub fn error(&self, pixel: usize) -> f64 {
         (self.of_one_sample(pixel) / self.samples[pixel].max(1.0)).sqrt()
     }
@@ -238,6 +243,26 @@ mod tests {
                 }
             }
         }
+    }
+
+    /// Blocked light asks for samples; no noise is told of it.
+    #[test]
+    fn blocked_light_is_no_noise_yet() {
+        let of = |blocked: f64| {
+            let pixel = Halves {
+                counts: [8; 2],
+                means: [1.1, 0.9],
+                brightest: 1.5,
+                blocked,
+                is_spoilt: false,
+            };
+            Estimate::of(&[pixel; 64], 8, Grey(0.1))
+        };
+        let (plain, shadowed) = (of(0.0), of(100.0));
+        assert_eq!(plain.told(27), shadowed.told(27));
+        assert_eq!(plain.told(27), plain.error(27));
+        assert!(shadowed.error(27) > 1.5 * plain.error(27));
+        assert!((plain.told(27) / plain.of_frame().error - 1.0).abs() < 1e-9);
     }
 
     #[test]
