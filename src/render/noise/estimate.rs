@@ -258,7 +258,7 @@ mod tests {
             };
             Estimate::of(&[pixel; 64], 8, Grey(0.1))
         };
-        let (plain, shadowed) = (of(0.0), of(100.0));
+        let (plain, shadowed) = (of(0.0), of(1e6));
         assert_eq!(plain.told(27), shadowed.told(27));
         assert_eq!(plain.told(27), plain.error(27));
         assert!(shadowed.error(27) > 1.5 * plain.error(27));
