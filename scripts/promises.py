@@ -4,8 +4,8 @@
     python3 scripts/promises.py target/release SCENE... [--res 96x54] [--depth 1] [--table FILE]
 
 For each scene a converged picture is rendered, in two halves with seeds of their own. Then:
-told over true error at 16, 64 and 256 samples, of frames and of blocks of 8x8 pixels (the layer `error`); the true error where 0.1, 0.05 and 0.02 are asked for, and that of
-as many samples in every pixel, with the seconds of processor time of both: all of the program, that is with reading the
+told over true error at 16, 64 and 256 samples, of frames and of blocks of 8x8 pixels (the layer `error`); the true error
+where 0.1, 0.05 and 0.02 are asked for, and that of as many samples in every pixel, with the seconds of processor time of both: all of the program, that is with reading the
 scene and choosing the knob of splitting. The measure is that of
 `src/render/noise`: the root mean square of the difference in the logarithm of luminance plus the grey floor.
 """
@@ -16,14 +16,24 @@ import resource
 import subprocess
 import tempfile
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import OpenEXR
 
 WEIGHTS = (0.2126, 0.7152, 0.0722)
-
-
 BLOCK = 8
+"""Pixels to each side of a block."""
+
+
+class Picture(NamedTuple):
+    """What a render gave: luminance, what the program told of the frame, and seconds of processor time."""
+
+    light: np.ndarray
+    noise: dict
+    seconds: float
+    errors: np.ndarray | None
+    """The layer `error`, if it was asked for."""
 
 
 class Shot:
@@ -34,7 +44,6 @@ class Shot:
         self.folder = Path(folder)
 
     def render(self, *options, aov="beauty"):
-        """The luminance, the event of the frame, and the seconds of processor time; with `aov="error"` that layer, too."""
         picture = self.folder / "picture.exr"
         command = [*self.command, "-o", str(picture), "--progress", "json", "--aov", aov, *map(str, options)]
         started = processor_seconds()
@@ -44,7 +53,8 @@ class Shot:
         done = next(event for event in events if event["event"] == "frame-done")
         channels = OpenEXR.File(str(picture), separate_channels=True).channels()
         light = sum(weight * channels[name].pixels.astype(float) for weight, name in zip(WEIGHTS, "RGB"))
-        return (light, done, seconds, channels["error"].pixels.astype(float)) if aov == "error" else (light, done, seconds)
+        errors = channels["error"].pixels.astype(float) if "error" in channels else None
+        return Picture(light, done["noise"], seconds, errors)
 
 
 def processor_seconds():
@@ -60,7 +70,7 @@ class Reference:
         if kept and kept.exists():
             self.halves = list(np.load(kept))
             return
-        self.halves = [shot.render("--spp", samples, "--seed", seed)[0] for seed in (7001, 7002)]
+        self.halves = [shot.render("--spp", samples, "--seed", seed).light for seed in (7001, 7002)]
         if kept:
             np.save(kept, np.array(self.halves))
 
@@ -89,16 +99,16 @@ def root(squares):
 
 
 def measure(shot, reference, seeds, errors, told_at):
-    grey = shot.render("--error", 10, "--spp", 8)[1]["noise"]["grey"]
+    grey = shot.render("--error", 10, "--spp", 8).noise["grey"]
     rows = {"told": {}, "asked": {}, "grey": grey}
     for count in told_at:
         told, true, of_blocks = [], [], 0
         for seed in range(seeds):
-            light, done, _, layer = shot.render("--spp", count, "--grey", grey, "--seed", seed, aov="error")
-            told.append(done["noise"]["error"] ** 2)
-            true.append(reference.error(light, grey))
-            squares, noisy = reference.squared_errors(light, grey)
-            of_blocks += np.array([blocks(layer**2 * noisy), blocks(squares * noisy)])
+            picture = shot.render("--spp", count, "--grey", grey, "--seed", seed, aov="error")
+            squares, noisy = reference.squared_errors(picture.light, grey)
+            told.append(picture.noise["error"] ** 2)
+            true.append(squares[noisy].mean())
+            of_blocks += np.array([blocks(picture.errors**2 * noisy), blocks(squares * noisy)])
         block_told, block_true = of_blocks[:, blocks(noisy * 1.0) >= BLOCK]
         ratios = np.sqrt(block_told / np.maximum(block_true, 1e-12))
         # Standard error of the ratio of sums over blocks (Cochran 1977, section 6); half of it for its root.
@@ -111,14 +121,14 @@ def measure(shot, reference, seeds, errors, told_at):
     for asked in errors:
         true, even, told, counts, seconds, even_seconds = [], [], [], [], [], []
         for seed in range(seeds if asked > 0.04 else 1):
-            light, done, took = shot.render("--error", asked, "--grey", grey, "--seed", seed)
-            true.append(reference.error(light, grey))
-            told.append(done["noise"]["error"] ** 2)
-            counts.append(done["noise"]["samples"])
-            seconds.append(took)
-            light, _, took = shot.render("--spp", max(2, round(counts[-1])), "--grey", grey, "--seed", 50 + seed)
-            even.append(reference.error(light, grey))
-            even_seconds.append(took)
+            picture = shot.render("--error", asked, "--grey", grey, "--seed", seed)
+            true.append(reference.error(picture.light, grey))
+            told.append(picture.noise["error"] ** 2)
+            counts.append(picture.noise["samples"])
+            seconds.append(picture.seconds)
+            picture = shot.render("--spp", max(2, round(counts[-1])), "--grey", grey, "--seed", 50 + seed)
+            even.append(reference.error(picture.light, grey))
+            even_seconds.append(picture.seconds)
         mean = lambda values: sum(values) / len(values)
         rows["asked"][asked] = {
             "told": root(told), "true": root(true), "even": root(even), "samples": mean(counts),

@@ -72,9 +72,9 @@ pub fn frames_of_grey(frames: &[i32]) -> Vec<i32> {
 }
 
 /// The settings with the knobs of splitting that are best for the shot. `pilot` asks the delegate, and is
-/// called only if there is anything to find out. Where time decides how many samples there will be, those of the settings are
-/// only the most: `in_time` has how many of a pixel the time is likely to pay for. A pilot is for that many, or the usual
-/// number if that is less, so that it takes no more than its share of the time.
+/// called only if there is anything to find out. Where time decides how many samples there will be, `in_time` has
+/// how many of a pixel the time is likely to pay for. The pilot is for that many, or for the usual number if that
+/// is less, so that it takes no more than its share of the time.
 ///
 /// # Errors
 /// Those of `pilot`.

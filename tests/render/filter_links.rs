@@ -1,7 +1,7 @@
 //! Filter links: for what a light filter filters.
 
 use crate::closed_forms::{ALBEDO, assert_dark, assert_irradiance, receiver};
-use crate::filters::ball;
+use crate::filters::{ball, card_in_fog};
 use crate::linking::{KINDS, Lamp, hide_no_light, lamp};
 use crate::rooms::{self, Room};
 use crate::stage::{Set, Stage, at, direct, facing, glow, lambert, scaled, tree_bytes};
@@ -10,7 +10,7 @@ use crate::strategies::{assert_agreement, every_way};
 use candelabra::render::RenderSettings;
 use candelabra::scene::{
     BlockerShape, FilterKind, LightFilter, LightFilters, LightKind, LinkRows, Linking, Links,
-    Material, Medium, Membership, Scene, Trs,
+    Material, Membership, Scene, Trs,
 };
 use glam::{DVec3, Vec3};
 use std::collections::BTreeMap;
@@ -145,14 +145,7 @@ fn a_mirror_shows_lamps_by_its_own_filters() {
 #[test]
 fn fog_is_filtered_as_it_is_linked() {
     let seen = |from: Vec<Option<u32>>| {
-        let mut stage = Stage::default();
-        let kind = LightKind::Point { intensity_cd: Vec3::splat(5.0) };
-        stage.light(kind, at(DVec3::new(1.0, 0.5, 0.0)));
-        stage.quad([0.1; 2], lambert(Vec3::ONE), at(DVec3::new(0.0, 0.0, -1.0)));
-        stage.look(DVec3::new(0.0, 0.0, 3.0), DVec3::ZERO, 0.5);
-        let (scattering, absorption) = (Vec3::splat(0.2), Vec3::ZERO);
-        let medium = Medium { scattering, absorption, anisotropy: 0.0, region: None };
-        stage.scene.medium = Some(medium);
+        let mut stage = card_in_fog();
         let dark = (FilterKind::Multiplier(Vec3::ZERO), at(DVec3::ZERO), from);
         filter(&mut stage, &[Lamp::Light(0)], vec![dark]);
         stage.render(&direct(12, 64)).beauty().map(|beauty| beauty.x).collect::<Vec<f32>>()

@@ -182,18 +182,23 @@ fn every_way_gives_the_same_picture() {
     assert_agreement(&room, &ways);
 }
 
+/// A card in fog that fills the world, lit by a point.
+pub fn card_in_fog() -> Stage {
+    let mut stage = Stage::default();
+    let kind = LightKind::Point { intensity_cd: Vec3::splat(5.0) };
+    stage.light(kind, at(DVec3::new(1.0, 0.5, 0.0)));
+    stage.quad([0.1; 2], lambert(Vec3::ONE), at(DVec3::new(0.0, 0.0, -1.0)));
+    stage.look(DVec3::new(0.0, 0.0, 3.0), DVec3::ZERO, 0.5);
+    let (scattering, absorption) = (Vec3::splat(0.2), Vec3::ZERO);
+    stage.scene.medium = Some(Medium { scattering, absorption, anisotropy: 0.0, region: None });
+    stage
+}
+
 /// Fog inside of a rod is dark.
 #[test]
 fn fog_is_filtered() {
     let seen = |radius: f32| {
-        let mut stage = Stage::default();
-        let kind = LightKind::Point { intensity_cd: Vec3::splat(5.0) };
-        stage.light(kind, at(DVec3::new(1.0, 0.5, 0.0)));
-        stage.quad([0.1; 2], lambert(Vec3::ONE), at(DVec3::new(0.0, 0.0, -1.0)));
-        stage.look(DVec3::new(0.0, 0.0, 3.0), DVec3::ZERO, 0.5);
-        let (scattering, absorption) = (Vec3::splat(0.2), Vec3::ZERO);
-        let medium = Medium { scattering, absorption, anisotropy: 0.0, region: None };
-        stage.scene.medium = Some(medium);
+        let mut stage = card_in_fog();
         filter(&mut stage, &[Lamp::Light(0)], vec![(ball(radius, 0.0, 0.0, 1.0), at(DVec3::ZERO))]);
         stage.render(&direct(12, 256)).beauty().map(|beauty| beauty.x).sum::<f32>()
     };

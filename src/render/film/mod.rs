@@ -73,7 +73,7 @@ impl Film {
         }
     }
 
-    /// Makes the layer of errors relative to a floor. Without one it is that of the picture.
+    /// Makes the layer of errors relative to a floor. Without one, the floor is that of the picture.
     pub fn set_grey(&mut self, grey: Option<Grey>) {
         self.grey = grey;
     }
